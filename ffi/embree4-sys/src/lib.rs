@@ -1,0 +1,1 @@
+//! embree4-sys

@@ -1,0 +1,1 @@
+//! Images in and out through OpenImageIO, view transform, error metrics.

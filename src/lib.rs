@@ -1,0 +1,21 @@
+//! # gsii
+//!
+//! Physically accurate images of cluttered scenes on a CPU: *Geometric Simplification for Indirect Illumination*
+//! (Rushmeier, Patterson, Veerasamy 1993) on Embree and OpenImageIO.
+//!
+//! Data flows one way: [`scene`] is simplified ([`simplify`]), solved ([`radiosity`]), rendered
+//! ([`render`]) and written ([`image`]); ray queries of every stage go through [`backend`].
+
+pub mod backend;
+pub mod error;
+pub mod image;
+pub mod lighting;
+pub mod progress;
+pub mod radiosity;
+pub mod render;
+pub mod sampling;
+pub mod scene;
+pub mod shading;
+pub mod simplify;
+
+pub use error::{Error, Result};

@@ -1,0 +1,73 @@
+//! Random and low-discrepancy numbers, without state: every value is a function of seed, index and dimension.
+
+use std::f32::consts::PI;
+
+use glam::{Vec2, Vec3};
+
+/// Owen-scrambled Sobol points, four dimensions at a time, with values in 0..1.
+///
+/// `stream` keeps unrelated uses (pixels, patches, clusters) apart; `index` is the sample's number, less than 65536, and
+/// every prefix of a power of two is well distributed; `dimension` numbers blocks of four, 0..64.
+pub fn sobol(index: u32, dimension: u32, stream: u32) -> [f32; 4] {
+    sobol_burley::sample_4d(index & 0xffff, dimension, hash(stream ^ (index >> 16).wrapping_mul(0x9e37_79b9)))
+}
+
+/// A good 32-bit hash (Ettinger's two-round mixer).
+pub fn hash(mut x: u32) -> u32 {
+    x ^= x >> 16;
+    x = x.wrapping_mul(0x7feb_352d);
+    x ^= x >> 15;
+    x = x.wrapping_mul(0x846c_a68b);
+    x ^ (x >> 16)
+}
+
+/// Hash of several numbers, order counts.
+pub fn hash_all(values: &[u32]) -> u32 {
+    values.iter().fold(0x2545_f491, |h, &v| hash(h ^ v.wrapping_add(0x9e37_79b9).wrapping_add(h << 6)))
+}
+
+/// A uniform number in 0..1 from a hash value.
+pub fn unit(hash: u32) -> f32 {
+    (hash >> 8) as f32 * (1.0 / 16_777_216.0)
+}
+
+/// A cosine-distributed unit vector about +z, `pdf = z / pi`. Concentric map (Shirley and Chiu 1997).
+pub fn cosine_hemisphere(u: Vec2) -> Vec3 {
+    let d = concentric_disk(u);
+    Vec3::new(d.x, d.y, (1.0 - d.length_squared()).max(0.0).sqrt())
+}
+
+/// A uniform point on the unit disk.
+pub fn concentric_disk(u: Vec2) -> Vec2 {
+    let o = 2.0 * u - Vec2::ONE;
+    if o == Vec2::ZERO {
+        return Vec2::ZERO;
+    }
+    let (r, theta) = if o.x.abs() > o.y.abs() {
+        (o.x, (PI / 4.0) * (o.y / o.x))
+    } else {
+        (o.y, PI / 2.0 - (PI / 4.0) * (o.x / o.y))
+    };
+    let (sin, cos) = theta.sin_cos();
+    r * Vec2::new(cos, sin)
+}
+
+/// A uniform unit vector.
+pub fn uniform_sphere(u: Vec2) -> Vec3 {
+    let z = 1.0 - 2.0 * u.x;
+    let r = (1.0 - z * z).max(0.0).sqrt();
+    let (sin, cos) = (2.0 * PI * u.y).sin_cos();
+    Vec3::new(r * cos, r * sin, z)
+}
+
+/// An orthonormal basis whose third axis is the unit vector `n` (Duff et al. 2017).
+pub fn basis(n: Vec3) -> glam::Mat3 {
+    let sign = 1.0_f32.copysign(n.z);
+    let a = -1.0 / (sign + n.z);
+    let b = n.x * n.y * a;
+    glam::Mat3::from_cols(
+        Vec3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x),
+        Vec3::new(b, sign + n.y * n.y * a, -n.y),
+        n,
+    )
+}

@@ -1,0 +1,123 @@
+//! Surface materials: glTF's metallic-roughness model with the extensions that matter for light transport.
+
+use glam::{Affine2, Vec3};
+
+/// A texture as one parameter of a material uses it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TextureSlot {
+    /// Index into [`Scene::textures`](super::Scene::textures).
+    pub texture: u32,
+    /// Which set of texture coordinates, 0 or 1.
+    pub uv_set: u8,
+    /// `KHR_texture_transform`, applied to the coordinates.
+    pub transform: Affine2,
+}
+
+/// What alpha means for a material.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Alpha {
+    /// Alpha is ignored.
+    Opaque,
+    /// Present where alpha is at least the cutoff.
+    Mask {
+        /// Cutoff, 0..1.
+        cutoff: f32,
+    },
+    /// Present with probability alpha (coverage).
+    Blend,
+}
+
+/// A surface material. Colours are linear RGB reflectances or radiances.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Material {
+    /// Name, for messages.
+    pub name: String,
+    /// Base colour, each band 0..=1: reflectance of the diffuse lobe or F0 of the metal.
+    pub base_color: Vec3,
+    /// Opacity, 0..=1: what alpha of texture and vertex colour are multiplied with.
+    pub opacity: f32,
+    /// Multiplies base colour and opacity.
+    pub base_color_texture: Option<TextureSlot>,
+    /// 0 dielectric ..= 1 metal.
+    pub metallic: f32,
+    /// Perceptual roughness 0..=1; the GGX width is its square.
+    pub roughness: f32,
+    /// Green multiplies roughness, blue metallic.
+    pub metallic_roughness_texture: Option<TextureSlot>,
+    /// Tangent-space normal map.
+    pub normal_texture: Option<TextureSlot>,
+    /// Scale of the normal map's x and y.
+    pub normal_scale: f32,
+    /// Emitted radiance, W/(sr m^2) per band.
+    pub emission: Vec3,
+    /// Multiplies emission.
+    pub emission_texture: Option<TextureSlot>,
+    /// Index of refraction of the dielectric (`KHR_materials_ior`).
+    pub ior: f32,
+    /// Strength of the dielectric specular lobe (`KHR_materials_specular`), 0..=1.
+    pub specular: f32,
+    /// Colour of the dielectric specular lobe at normal incidence.
+    pub specular_color: Vec3,
+    /// Share of the diffuse lobe replaced by transmission (`KHR_materials_transmission`), 0..=1.
+    pub transmission: f32,
+    /// Whether transmitted light refracts (`KHR_materials_volume` with thickness); otherwise it goes straight on.
+    pub refracts: bool,
+    /// Colour that white light takes on after [`Material::attenuation_distance`] inside.
+    pub attenuation_color: Vec3,
+    /// Distance for the attenuation colour; infinite for clear glass.
+    pub attenuation_distance: f32,
+    /// What alpha means.
+    pub alpha: Alpha,
+    /// Whether both faces emit. Both faces always reflect, with the same properties.
+    pub double_sided: bool,
+}
+
+impl Default for Material {
+    /// glTF's default material: white, fully rough metal.
+    fn default() -> Self {
+        Material {
+            name: String::new(),
+            base_color: Vec3::ONE,
+            opacity: 1.0,
+            base_color_texture: None,
+            metallic: 1.0,
+            roughness: 1.0,
+            metallic_roughness_texture: None,
+            normal_texture: None,
+            normal_scale: 1.0,
+            emission: Vec3::ZERO,
+            emission_texture: None,
+            ior: 1.5,
+            specular: 1.0,
+            specular_color: Vec3::ONE,
+            transmission: 0.0,
+            refracts: false,
+            attenuation_color: Vec3::ONE,
+            attenuation_distance: f32::INFINITY,
+            alpha: Alpha::Opaque,
+            double_sided: false,
+        }
+    }
+}
+
+impl Material {
+    /// A purely Lambertian reflector.
+    pub fn lambertian(reflectance: Vec3) -> Self {
+        Material { base_color: reflectance, metallic: 0.0, specular: 0.0, ..Material::default() }
+    }
+
+    /// A Lambertian reflector that emits `radiance` from its front face.
+    pub fn emitter(radiance: Vec3, reflectance: Vec3) -> Self {
+        Material { emission: radiance, ..Material::lambertian(reflectance) }
+    }
+
+    /// Whether it emits at all.
+    pub fn is_emitter(&self) -> bool {
+        self.emission.max_element() > 0.0
+    }
+
+    /// Whether it is Lambertian everywhere: no specular lobe, no transmission, no metal.
+    pub fn is_lambertian(&self) -> bool {
+        self.metallic == 0.0 && self.specular == 0.0 && self.transmission == 0.0
+    }
+}

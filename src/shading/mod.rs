@@ -1,0 +1,10 @@
+//! What happens at a surface point: where it is, how light scatters there.
+//!
+//! A BSDF is split as in the paper, `f = f_h + f_l`: highly directional (mirror, glass, glossy under a roughness
+//! threshold) and weakly directional (diffuse and rough lobes).
+
+pub mod bsdf;
+pub mod point;
+
+pub use bsdf::{Bsdf, BsdfSample};
+pub use point::SurfacePoint;
