@@ -1,5 +1,7 @@
 //! Direct light: choosing a light source and a point on it (next-event estimation).
 
+pub mod shadow;
+
 use glam::Vec3;
 
 use crate::scene::Scene;

@@ -1,0 +1,1 @@
+//! `gsii validate`: Embree against obvhs.
