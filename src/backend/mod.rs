@@ -3,8 +3,10 @@
 //! Two implementations: [`embree`] (production) and [`obvhs`] (pure Rust, validates the first). Queries go in
 //! batches, so that one dynamic call and one crossing of the FFI serve thousands of rays.
 
+pub mod compare;
 pub mod embree;
 pub mod obvhs;
+mod triangle;
 #[cfg(test)]
 mod tests;
 
@@ -16,13 +18,15 @@ use glam::Vec3;
 use crate::error::Result;
 
 /// A ray and the part of it that counts, `t_near <= t <= t_far`, in units of the length of `direction`
-/// (unit length wherever a distance is meant).
+/// (unit length wherever a distance is meant). A hit at `t = 0` never counts: that is where the ray starts.
+///
+/// Rays with NaN or infinite parts (but for `t_far`), without a direction or with `t_far < t_near` hit nothing.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
     /// Start point, in scene coordinates.
     pub origin: Vec3,
-    /// Smallest parameter at which a hit counts; not negative.
+    /// Smallest parameter at which a hit counts; negative is taken as 0.
     pub t_near: f32,
     /// Direction.
     pub direction: Vec3,
@@ -34,6 +38,12 @@ impl Ray {
     /// A ray from `origin` to infinity.
     pub fn new(origin: Vec3, direction: Vec3) -> Self {
         Ray { origin, t_near: 0.0, direction, t_far: f32::INFINITY }
+    }
+
+    /// Whether the ray can hit anything at all; see [`Ray`].
+    pub fn is_usable(&self) -> bool {
+        let Ray { origin, t_near, direction, t_far } = *self;
+        origin.is_finite() && direction.is_finite() && direction != Vec3::ZERO && t_near.is_finite() && t_far >= t_near
     }
 
     /// The point at parameter `t`.

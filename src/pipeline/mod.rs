@@ -19,7 +19,7 @@ use crate::progress::Progress;
 use crate::radiosity::{self, RadiosityParams, RadiosityScene, Solution};
 use crate::render::{FarField, Nearness, World};
 use crate::scene::alpha::AlphaFilter;
-use crate::scene::{Aabb, Camera, Scene};
+use crate::scene::{Camera, Scene};
 use crate::simplify::{self, Simplified, SimplifiedGeometry, SimplifyParams, TriangleSource};
 
 /// A scene, prepared for one method: acceleration structures, simplified scene, radiosity solution.
@@ -174,7 +174,7 @@ impl BackendKind {
     pub fn create(self, threads: usize) -> Result<Box<dyn RayBackend>> {
         Ok(match self {
             BackendKind::Embree => Box::new(EmbreeBackend::new(threads)?),
-            BackendKind::Obvhs => Box::new(ObvhsBackend::new()),
+            BackendKind::Obvhs => Box::new(ObvhsBackend),
         })
     }
 }

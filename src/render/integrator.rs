@@ -499,7 +499,7 @@ impl<'a> World<'a> {
         let n = ws.shadow_rays.len();
         if self.has_panes {
             ws.transmittance.resize(n, Vec3::ZERO);
-            shadow::visibility(self.detailed, self.scene, &ws.shadow_rays, &mut ws.transmittance);
+            shadow::visibility(self.detailed, self.scene, None, &ws.shadow_rays, &mut ws.transmittance);
         } else {
             ws.occluded.resize(n, false);
             self.detailed.occluded(&ws.shadow_rays, Visible::All, coherence, &mut ws.occluded);

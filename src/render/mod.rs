@@ -14,9 +14,9 @@ use std::time::{Duration, Instant};
 use rayon::prelude::*;
 
 pub use film::Film;
-pub use integrator::{FarField, RayCounts, World};
+pub use integrator::{FarField, PassTimes, RayCounts, World};
 pub use nearness::Nearness;
-use integrator::{Batch, PassTimes, Workspace};
+use integrator::{Batch, Workspace};
 use path::Passes;
 use plan::Allocation;
 

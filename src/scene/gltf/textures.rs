@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::buffers::Buffers;
 use super::json::valid;
-use crate::image::{PixelData, Pixels, decode_texture};
+use crate::image::{Data, Pixels, decode_texture};
 use crate::scene::texture::srgb_to_linear;
 use crate::scene::{SceneBuilder, Texels, Texture, TextureSlot, Wrap};
 
@@ -83,13 +83,13 @@ impl<'a> Textures<'a> {
     }
 }
 
-fn texels(data: PixelData, coding: Coding) -> Texels {
+fn texels(data: Data, coding: Coding) -> Texels {
     match (data, coding) {
-        (PixelData::U8(bytes), Coding::Color) => Texels::Srgb8(bytes),
-        (PixelData::U8(bytes), Coding::Data) => Texels::Linear8(bytes),
-        (PixelData::F32(values), Coding::Data) => Texels::Float(values),
+        (Data::U8(bytes), Coding::Color) => Texels::Srgb8(bytes),
+        (Data::U8(bytes), Coding::Data) => Texels::Linear8(bytes),
+        (Data::F32(values), Coding::Data) => Texels::Float(values),
         // Images of more than eight bits are encoded all the same.
-        (PixelData::F32(mut values), Coding::Color) => {
+        (Data::F32(mut values), Coding::Color) => {
             for rgba in values.chunks_exact_mut(4) {
                 rgba[..3].iter_mut().for_each(|v| *v = srgb_to_linear(*v));
             }
