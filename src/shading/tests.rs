@@ -332,7 +332,7 @@ fn clear_glass_conserves_energy() {
 #[test]
 fn total_internal_reflection() {
     let scene = scene(Material { specular: 0.3, ..glass(0.0, 1.5, true) });
-    let critical = 41.810_314_895_778_625_f32.to_radians();
+    let critical = (1.0_f32 / 1.5).asin();
     let beyond = bsdf(&scene, -towards((critical + 0.001).cos()), 0.25);
     for i in 0..50 {
         let sample = beyond.sample_high(random(4, i)).expect("total reflection");
@@ -347,8 +347,8 @@ fn total_internal_reflection() {
 #[test]
 fn slab_transmits_as_referenced() {
     let degrees = [0.0, 30.0, 45.0, 60.0, 75.0, 85.0_f32];
-    let sheet = [0.923_076_92, 0.920_734_44, 0.907_344_33, 0.848_128_41, 0.618_148_52, 0.246_930_58];
-    let single_pass = [0.9216, 0.918_678_88, 0.902_044_23, 0.829_580_84, 0.557_918_52, 0.149_924_11];
+    let sheet = [0.923_077, 0.920_734, 0.907_344, 0.848_128, 0.618_149, 0.246_931];
+    let single_pass = [0.9216, 0.918_679, 0.902_044, 0.829_581, 0.557_919, 0.149_924];
     for (refracts, expected) in [(false, sheet), (true, single_pass)] {
         let mut scene = scene(glass(0.0, 1.5, refracts));
         scene.mesh.objects[0].kind = PartKind::Pane;
@@ -417,35 +417,5 @@ fn light_stays_on_its_side_of_the_geometry() {
                 }
             }
         }
-    }
-}
-
-#[test]
-#[ignore = "prints the cost of calls"]
-fn cost() {
-    let kinds = [
-        ("Lambertian", Material::lambertian(Vec3::ONE)),
-        ("coated", dielectric(Vec3::ONE, 0.5, 1.5)),
-        ("glass", glass(0.0, 1.5, true)),
-    ];
-    for (name, material) in kinds {
-        let scene = scene(material);
-        let count = 1_000_000;
-        let time = |label: &str, of: &dyn Fn(u32) -> f32| {
-            let start = std::time::Instant::now();
-            let sum: f32 = (0..count).map(of).sum();
-            println!("{name} {label}: {:.0} ns ({sum})", start.elapsed().as_nanos() as f64 / f64::from(count));
-        };
-        let hit = |i: u32| Hit { u: (i % 256) as f32 / 512.0, ..HIT };
-        time("point", &|i| SurfacePoint::new(&scene, &hit(i)).error.x);
-        let point = SurfacePoint::new(&scene, &HIT);
-        let outgoing: Vec<Vec3> = (0..256).map(|i| towards((i + 1) as f32 / 257.0)).collect();
-        let at = |i: u32| outgoing[i as usize % 256];
-        time("new", &|i| Bsdf::new(&scene, &point, at(i), 0.25).albedo_low().x);
-        let b = Bsdf::new(&scene, &point, towards(0.7), 0.25);
-        time("eval_low", &|i| b.eval_low(at(i)).x);
-        let u = |i: u32| [(i % 64) as f32 / 64.0, (i % 97) as f32 / 97.0, (i % 89) as f32 / 89.0];
-        time("sample_low", &|i| b.sample_low(u(i)).map_or(0.0, |s| s.weight.x));
-        time("sample_high", &|i| b.sample_high(u(i)).map_or(0.0, |s| s.weight.x));
     }
 }
