@@ -55,8 +55,9 @@ fn agx_curve(value: f32) -> f32 {
     polynomial.into_iter().fold(0.0, |sum, coefficient| sum * x + coefficient)
 }
 
+/// Weighted means: the published rows sum to 1 only within 2e-4, which would tint greys.
 fn multiply(matrix: &[[f32; 3]; 3], v: [f32; 3]) -> [f32; 3] {
-    matrix.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2])
+    matrix.map(|row| (row[0] * v[0] + row[1] * v[1] + row[2] * v[2]) / (row[0] + row[1] + row[2]))
 }
 
 /// Linear 0..1 to sRGB-encoded 0..1 (IEC 61966-2-1).
@@ -111,8 +112,9 @@ mod tests {
             // 2^-14 to 2^6 in steps of a hundredth of a stop.
             for step in 0..2000 {
                 let encoded = view.encode([(step as f32 / 100.0 - 14.0).exp2(); 3]);
-                // The published rows sum to 1 within 1.4e-4: 2e-4 stops of 16.5, times a slope of at most 3, twice.
-                assert!(encoded.iter().all(|band| (band - encoded[0]).abs() < 1e-4), "{view:?} {encoded:?}");
+                // Greys meet equal weights, so only rounding tells the bands apart: some ten operations on values up
+                // to 40 (the polynomial's coefficients), 6e-8 each.
+                assert!(encoded.iter().all(|band| (band - encoded[0]).abs() < 2.4e-5), "{view:?} {encoded:?}");
                 assert!(encoded[0] >= last - 1e-6, "{view:?} falls at step {step}: {last} to {}", encoded[0]);
                 last = encoded[0];
             }
