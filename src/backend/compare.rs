@@ -1,6 +1,6 @@
 //! Two ray-tracing libraries against each other, ray by ray, every difference explained or counted as a failure.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::triangle::{PlaneHit, meet_plane};
@@ -123,34 +123,41 @@ struct Exact {
 }
 
 impl Exact {
-    /// Error bounds, to first order, of the test that starts with corners relative to the ray's origin, in units of
-    /// the roundoff `U`: a corner p is off by |p|, an edge e between corners p, q by |e| + |p| + |q|, a product of
-    /// three vectors by three roundings of each of its terms besides what its factors are off.
-    fn new(ray: &Ray, corners: [glam::Vec3; 3]) -> Option<Exact> {
+    /// First-order error bounds of the test that starts with corners relative to the ray's origin (Plücker; Embree's
+    /// robust mode), in units of the roundoff `U`. The difference corner - origin is off by its length, which is the
+    /// same as if the corner had been moved by that; what follows works with lengths of the triangle's own size: a
+    /// cross product is off by five roundings (two of its factors, three of its own), a dot product by three.
+    fn new(ray: &Ray, corners: [Vec3; 3]) -> Option<Exact> {
         let met = meet_plane(ray, corners)?;
         let origin = ray.origin.as_dvec3();
-        let direction = ray.direction.as_dvec3().length();
+        let direction = ray.direction.as_dvec3();
+        let speed = direction.length();
         let [a, b, c] = corners.map(|corner| corner.as_dvec3() - origin);
-        let reach = a.length().max(b.length()).max(c.length());
-        let edge = (b - a).length().max((c - b).length()).max((a - c).length());
-        let edge_off = edge + 2.0 * reach;
-        // Embree takes edge x (p + q) for 2 p x q: |p + q| <= 2 reach, itself off by 4 reach.
-        let volume_off = direction * (edge_off * 2.0 * reach + edge * 4.0 * reach + 5.0 * edge * 2.0 * reach) / 2.0;
-        let normal: DVec3 = (b - a).cross(c - a);
-        let normal_off = 2.0 * edge_off * edge + 3.0 * edge * edge;
-        let facing_off = direction * (normal_off + 3.0 * normal.length());
-        let height_off = reach * (normal_off + 4.0 * normal.length());
+        let largest = |lengths: [f64; 3]| lengths.into_iter().fold(0.0, f64::max);
+        let reach = largest([a, b, c].map(DVec3::length));
+        let edge = largest([b - a, c - b, a - c].map(DVec3::length));
+        let normal = (b - a).cross(c - a).length();
+        // A corner moved by d changes d . (other corner x direction), i.e. by the other's distance from the ray.
+        let from_ray = largest([a, b, c].map(|corner| corner.cross(direction).length() / speed));
+        let volume_off = U * speed * reach * (2.0 * from_ray + 8.0 * edge);
+        let facing_off = U * speed * (3.0 * reach * edge + 5.0 * edge * edge + 3.0 * normal);
         let facing = met.facing.abs();
-        // Embree divides by the facing or by the sum of the volumes: the worse of the two.
-        let dfacing = U * facing_off.max(3.0 * volume_off);
-        // A facing that may have any value, zero included, makes every t and weight possible.
-        let scale = if dfacing < facing { 1.0 / (facing - dfacing) } else { f64::INFINITY };
-        let weight = met.weights.iter().fold(1.0, |largest: f64, weight| largest.max(weight.abs()));
+        // A divisor that may be zero makes every quotient possible.
+        let quotient = |off: f64| if off < facing { 1.0 / (facing - off) } else { f64::INFINITY };
+
+        // Embree does not divide by less than this (twice the facing), it answers u = v = 0.
+        let undivided = if 2.0 * facing < 1.01e-18 { 1.0 } else { 0.0 };
+
+        let weight = largest(met.weights.map(f64::abs)).max(1.0);
+        let from_hit = largest([a, b, c].map(|corner| (corner - met.t * direction).length()));
+        // Moved corners move the plane at the hit by their weighted mean; a normal that is off turns it around a corner.
+        let height_off =
+            U * (3.0 * weight * reach * normal + 5.0 * edge * edge * from_hit + 6.0 * normal * (reach + from_hit));
         Some(Exact {
             met,
-            dt: (U * height_off + met.t.abs() * dfacing) * scale + 4.0 * U * met.t.abs(),
-            dw: (U * volume_off + weight * dfacing) * scale + 4.0 * U * weight,
-            dfacing,
+            dt: height_off * quotient(facing_off) + 4.0 * U * met.t.abs(),
+            dw: (1.0 + 3.0 * weight) * volume_off * quotient(3.0 * volume_off) + 4.0 * U * weight + undivided,
+            dfacing: facing_off,
         })
     }
 }

@@ -6,9 +6,9 @@
 pub mod compare;
 pub mod embree;
 pub mod obvhs;
-mod triangle;
 #[cfg(test)]
 mod tests;
+mod triangle;
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -18,7 +18,7 @@ use glam::Vec3;
 use crate::error::Result;
 
 /// A ray and the part of it that counts, `t_near <= t <= t_far`, in units of the length of `direction`
-/// (unit length wherever a distance is meant). A hit at `t = 0` never counts: that is where the ray starts.
+/// (unit length wherever a distance is meant).
 ///
 /// Rays with NaN or infinite parts (but for `t_far`), without a direction or with `t_far < t_near` hit nothing.
 #[repr(C)]
@@ -26,7 +26,8 @@ use crate::error::Result;
 pub struct Ray {
     /// Start point, in scene coordinates.
     pub origin: Vec3,
-    /// Smallest parameter at which a hit counts; negative is taken as 0.
+    /// Smallest parameter at which a hit counts; negative is taken as 0, at which a ray that starts on a triangle
+    /// hits it.
     pub t_near: f32,
     /// Direction.
     pub direction: Vec3,

@@ -6,10 +6,10 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use ::obvhs::BvhBuildParams;
 use ::obvhs::aabb::Aabb;
 use ::obvhs::bvh2::Bvh2;
 use ::obvhs::bvh2::builder::build_bvh2;
-use ::obvhs::BvhBuildParams;
 use glam::{Vec3, Vec3A};
 
 use super::triangle::meet_plane;
@@ -105,9 +105,7 @@ impl ObvhsScene {
                     }
                 }
             } else {
-                let enter = |child: u32| {
-                    slabs.enter(self.tree.nodes[child as usize].aabb(), t_far).map(|t| (t, child))
-                };
+                let enter = |child: u32| slabs.enter(self.tree.nodes[child as usize].aabb(), t_far).map(|t| (t, child));
                 match (enter(first), enter(first + 1)) {
                     (Some(a), Some(b)) => {
                         let (near, far) = if a.0 <= b.0 { (a, b) } else { (b, a) };
@@ -128,7 +126,7 @@ impl ObvhsScene {
             Visible::OnlyPanes => primitive.kind == PartKind::Pane,
         };
         let met = seen.then(|| meet_plane(ray, primitive.corners)).flatten().filter(|met| met.inside())?;
-        if met.t <= 0.0 || met.t < f64::from(ray.t_near) || met.t > f64::from(ray.t_far) {
+        if met.t < f64::from(ray.t_near).max(0.0) || met.t > f64::from(ray.t_far) {
             return None;
         }
         let [_, u, v] = met.weights.map(|weight| weight as f32);

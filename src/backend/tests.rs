@@ -128,7 +128,7 @@ impl Brute<'_> {
                 let s = origin - a;
                 let q = s.cross(ab);
                 let (u, v, t) = (s.dot(p) / det, direction.dot(q) / det, ac.dot(q) / det);
-                if !(u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0) {
+                if !(u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t >= 0.0) {
                     continue;
                 }
                 if t < ray.t_near.into() || t > ray.t_far.into() || t >= best.t.into() {
@@ -233,7 +233,7 @@ fn one_sided_triangles_stop_only_rays_from_the_front() {
 }
 
 #[test]
-fn the_interval_is_closed_and_excludes_the_start() {
+fn the_interval_is_closed() {
     let positions = [Vec3::ZERO, Vec3::X, Vec3::Y];
     let parts = [Part { triangles: 0..1, kind: PartKind::Opaque }];
     let set = TriangleSet { positions: &positions, triangles: &[[0, 1, 2]], parts: &parts, filter: None };
@@ -250,12 +250,23 @@ fn the_interval_is_closed_and_excludes_the_start() {
             (ray(2.0, 1.0, 2.0), true),
             (ray(2.0, 2.001, 3.0), false),
             (ray(2.0, 1.0, 1.999), false),
-            (ray(0.0, 0.0, 1.0), false),
-            (ray(0.0, -1.0, 1.0), false),
+            (ray(0.0, 0.0, 1.0), true),
+            (ray(-0.5, -1.0, 1.0), false),
         ] {
-            let hit = closest(&*scene, ray);
-            assert_eq!(hit.is_hit(), expected, "{}: {ray:?}", backend.name());
-            assert!(!hit.is_hit() || (hit.t >= ray.t_near && hit.t <= ray.t_far), "{}: {hit:?}", backend.name());
+            for coherence in COHERENCES {
+                let mut hit = [Hit::MISS];
+                let mut occluded = [false];
+                scene.closest(&[ray], Visible::All, coherence, &mut hit);
+                scene.occluded(&[ray], Visible::All, coherence, &mut occluded);
+                let [hit] = hit;
+                assert_eq!(
+                    (hit.is_hit(), occluded),
+                    (expected, [expected]),
+                    "{} {coherence:?} {ray:?}",
+                    backend.name()
+                );
+                assert!(!hit.is_hit() || (hit.t >= ray.t_near && hit.t <= ray.t_far), "{}: {hit:?}", backend.name());
+            }
         }
     }
 }
@@ -365,17 +376,16 @@ fn backends_agree_and_every_difference_is_explained() {
 
 #[test]
 fn compare_finds_what_rounding_does_not_explain() {
-    let soup = Soup::random(30, 100, 1.0, &[PartKind::Opaque]);
-    let mut moved = Soup { positions: soup.positions.clone(), triangles: soup.triangles.clone(), ..Soup::cube() };
-    moved.parts = soup.parts.clone();
+    let (cube, mut moved) = (Soup::cube(), Soup::cube());
     for position in &mut moved.positions {
         *position += Vec3::splat(1e-4);
     }
-    let rays = soup.rays(30, 10_000, 1.0);
-    let (a, b) = (ObvhsBackend.build(&soup.set()).unwrap(), ObvhsBackend.build(&moved.set()).unwrap());
-    let result = compare(&rays, Visible::All, Coherence::Incoherent, &*a, &*b, &soup.set());
-    // All hits differ by more than a thousand roundings.
-    assert!(result.unexplained as f64 > 0.99 * (result.rays - result.misses) as f64, "{result:?}");
+    let rays: Vec<Ray> = (0..10_000).map(|i| Ray::new(Vec3::splat(0.5), random_direction(30, i))).collect();
+    let (a, b) = (ObvhsBackend.build(&cube.set()).unwrap(), ObvhsBackend.build(&moved.set()).unwrap());
+    let result = compare(&rays, Visible::All, Coherence::Incoherent, &*a, &*b, &cube.set());
+    // The faces moved by more than fifty roundings of t, which are at most 1e-6 seen from the middle; only where the
+    // ray meets an outline (1e-4 of the face's width) may that pass for rounding.
+    assert!(result.unexplained > 9_900, "{result:?}");
     assert!(!result.examples.is_empty());
 }
 
