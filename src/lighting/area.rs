@@ -1,6 +1,8 @@
 //! Light sources with area: single triangles, and rectangles made of two.
 
-use glam::{DVec3, Vec2, Vec3};
+use std::f64::consts::TAU;
+
+use glam::{DMat3, DVec3, Vec2, Vec3};
 
 use super::spherical::{Rectangle, Triangle, uniform_triangle};
 use crate::backend::Hit;
@@ -17,6 +19,10 @@ const FAR_SQUARED: f64 = 1e4;
 
 /// Smallest solid angle that is sampled as such; the f64 formulas are good to about 1e-15 sr.
 const MIN_SOLID_ANGLE: f64 = 1e-7;
+
+/// A point that sees a light source under a hemisphere less this solid angle is on it, as far as positions tell: its
+/// distance is less than about 1e-9 of the light's size.
+const ON_THE_LIGHT: f64 = 1e-9;
 
 /// Texture samples along one side of a triangle, at most.
 const MAX_TEXTURE_STEPS: u32 = 512;
@@ -59,7 +65,8 @@ pub(super) struct AreaPoint {
 #[derive(Clone, Copy, Debug)]
 enum View {
     Area,
-    Rectangle(Rectangle, f64),
+    /// In its frame: columns are its axes and the direction from the point of view to its plane.
+    Rectangle(Rectangle, DMat3, f64),
     Triangle(Triangle, f64),
 }
 
@@ -77,6 +84,12 @@ impl AreaLight {
     /// Unit normal of the counter-clockwise side.
     pub(super) fn normal(&self) -> DVec3 {
         self.cross.normalize_or_zero()
+    }
+
+    /// First corner.
+    #[cfg(test)]
+    pub(super) fn first_corner(&self) -> DVec3 {
+        self.corner
     }
 
     /// Centre of gravity and largest distance from it.
@@ -102,22 +115,30 @@ impl AreaLight {
         self.at(if self.is_rectangle() { u } else { uniform_triangle(u) })
     }
 
-    /// A point as seen from `position`, and its density per solid angle. `None` from the dark side or from edge-on.
-    pub(super) fn sample(&self, position: DVec3, u: [f32; 2]) -> Option<(AreaPoint, f64)> {
+    /// A point as seen from `position`, its offset from there, and its density per solid angle. `None` from the dark
+    /// side or from edge-on. The offset keeps its direction where the difference of the points would be lost in rounding.
+    pub(super) fn sample(&self, position: DVec3, u: [f32; 2]) -> Option<(AreaPoint, DVec3, f64)> {
         let view = self.view(position)?;
-        let (point, density) = match view {
+        Some(match view {
             View::Area => {
                 let point = self.uniform_point(u);
-                (point, self.area_density(point.position - position)?)
+                let offset = point.position - position;
+                (point, offset, self.area_density(offset)?)
             }
-            View::Rectangle(rectangle, angle) => {
+            View::Rectangle(rectangle, axes, angle) => {
                 let [x, y] = rectangle.sample(angle, u.map(f64::from));
                 let share = |v: f64, [v0, v1]: [f64; 2]| ((v - v0) / (v1 - v0)).clamp(0.0, 1.0);
-                (self.at([share(x, rectangle.x), share(y, rectangle.y)]), 1.0 / angle)
+                let point = self.at([share(x, rectangle.x), share(y, rectangle.y)]);
+                (point, axes * DVec3::new(x, y, rectangle.z), 1.0 / angle)
             }
-            View::Triangle(triangle, angle) => (self.at(triangle.sample(angle, u.map(f64::from))), 1.0 / angle),
-        };
-        Some((point, density))
+            View::Triangle(triangle, angle) => {
+                let (direction, weights) = triangle.sample(angle, u.map(f64::from));
+                let distance = (self.corner - position).dot(self.cross) / direction.dot(self.cross);
+                // No point is farther than the corners; a direction within rounding of the plane may say so (or NaN)
+                let distance = distance.abs().min(triangle.farthest());
+                (self.at(weights), distance * direction, 1.0 / angle)
+            }
+        })
     }
 
     /// Density per solid angle with which [`AreaLight::sample`] chooses the point at `offset` from `position`.
@@ -125,7 +146,7 @@ impl AreaLight {
         match self.view(position) {
             None => 0.0,
             Some(View::Area) => self.area_density(offset).unwrap_or(0.0),
-            Some(View::Rectangle(_, angle) | View::Triangle(_, angle)) => 1.0 / angle,
+            Some(View::Rectangle(_, _, angle) | View::Triangle(_, angle)) => 1.0 / angle,
         }
     }
 
@@ -157,12 +178,15 @@ impl AreaLight {
             let z = side.abs() / self.area;
             let rectangle = Rectangle { x: [x0, x0 + lengths[0]], y: [y0, y0 + lengths[1]], z };
             let angle = rectangle.solid_angle();
-            (View::Rectangle(rectangle, angle), angle)
+            (View::Rectangle(rectangle, DMat3::from_cols(x, y, -side.signum() * normal), angle), angle)
         } else {
             let triangle = Triangle::new(corner, self.edges, self.cross);
             let angle = triangle.solid_angle();
             (View::Triangle(triangle, angle), angle)
         };
+        if angle > TAU - ON_THE_LIGHT {
+            return None;
+        }
         // Also where NaN
         Some(if angle >= MIN_SOLID_ANGLE { view } else { View::Area })
     }

@@ -8,7 +8,7 @@ pub mod material;
 pub mod mesh;
 pub mod texture;
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
 pub use aabb::Aabb;
 pub use camera::{Camera, Projection};
@@ -49,19 +49,4 @@ pub struct ImportNotes {
     pub duplicate_triangles: usize,
     /// One sentence for each thing the user should know, without repetition.
     pub warnings: Vec<String>,
-}
-
-impl Scene {
-    /// Radiance emitted at barycentrics `u`, `v` of a triangle, W/(sr m^2) per band.
-    pub fn emission(&self, triangle: u32, u: f32, v: f32) -> Vec3 {
-        let material = &self.materials[self.mesh.object(triangle).material as usize];
-        let Some(slot) = &material.emission_texture else {
-            return material.emission;
-        };
-        let uvs = &self.mesh.uvs[usize::from(slot.uv_set)];
-        let [a, b, c] = self.mesh.triangles[triangle as usize].map(|i| uvs[i as usize]);
-        let uv = (1.0 - u - v) * a + u * b + v * c;
-        let texel = self.textures[slot.texture as usize].sample(slot.transform.transform_point2(uv));
-        material.emission * texel.truncate()
-    }
 }
