@@ -6,7 +6,7 @@ use glam::{DMat3, DVec3, Vec2, Vec3};
 
 use super::spherical::{Rectangle, Triangle, uniform_triangle};
 use crate::backend::Hit;
-use crate::scene::Scene;
+use crate::scene::{Alpha, Material, Scene, TextureSlot};
 
 /// How far from a right angle (cosine) and from a parallelogram (share of the shorter side) two triangles may be to count
 /// as a rectangle.
@@ -47,7 +47,8 @@ pub(super) struct AreaLight {
     right_corner: [u8; 2],
     /// Mean emitted radiance.
     pub radiance: Vec3,
-    textured: bool,
+    /// Whether the radiance differs from point to point.
+    varies: bool,
     /// Whether the clockwise side emits, too.
     pub both_faces: bool,
 }
@@ -106,7 +107,7 @@ impl AreaLight {
 
     /// Radiance emitted at a point of one of its triangles.
     pub(super) fn radiance_at(&self, scene: &Scene, point: &AreaPoint) -> Vec3 {
-        if self.textured { scene.emission(point.triangle, point.uv.x, point.uv.y) } else { self.radiance }
+        if self.varies { emission(scene, point.triangle, point.uv.x, point.uv.y) } else { self.radiance }
     }
 
     /// A uniform point; continuous in `u` on rectangles.
@@ -284,36 +285,45 @@ fn triangle_light(scene: &Scene, triangle: u32) -> Option<AreaLight> {
         triangles: [triangle, Hit::NONE],
         right_corner: [0; 2],
         radiance,
-        textured: material.emission_texture.is_some(),
+        varies: varies(material),
         both_faces: material.double_sided,
     })
 }
 
+/// Whether emission or presence differ from point to point.
+fn varies(material: &Material) -> bool {
+    material.emission_texture.is_some() || material.alpha != Alpha::Opaque
+}
+
+/// Radiance emitted at a point, weighted with the probability that the surface is there: shadow rays end before it, and
+/// do not ask.
+fn emission(scene: &Scene, triangle: u32, u: f32, v: f32) -> Vec3 {
+    scene.emission(triangle, u, v) * scene.opacity(triangle, u, v)
+}
+
 /// Mean of the radiance emitted by a triangle: one sample a texel along its sides.
 fn mean_radiance(scene: &Scene, triangle: u32) -> Vec3 {
-    let mesh = &scene.mesh;
-    let material = &scene.materials[mesh.object(triangle).material as usize];
-    let Some(slot) = &material.emission_texture else {
+    let material = scene.material(triangle);
+    if !varies(material) {
         return material.emission;
-    };
-    let uvs = &mesh.uvs[usize::from(slot.uv_set)];
-    let steps = if uvs.is_empty() {
-        1
-    } else {
+    }
+    let side_in_texels = |slot: &TextureSlot| {
         let texture = &scene.textures[slot.texture as usize];
         let size = Vec2::new(texture.width as f32, texture.height as f32);
-        let [a, b, c] =
-            mesh.triangles[triangle as usize].map(|v| slot.transform.transform_point2(uvs[v as usize]) * size);
-        let side = a.distance(b).max(b.distance(c)).max(c.distance(a));
-        (side.ceil() as u32).clamp(1, MAX_TEXTURE_STEPS)
+        let at = |u, v| slot.transform.transform_point2(scene.uv(slot.uv_set, triangle, u, v)) * size;
+        let (a, b, c) = (at(0.0, 0.0), at(1.0, 0.0), at(0.0, 1.0));
+        a.distance(b).max(b.distance(c)).max(c.distance(a))
     };
+    let alpha = material.base_color_texture.as_ref().filter(|_| material.alpha != Alpha::Opaque);
+    let side = material.emission_texture.iter().chain(alpha).map(side_in_texels).fold(1.0, f32::max);
+    let steps = (side.ceil() as u32).min(MAX_TEXTURE_STEPS);
     // Centres of steps^2 congruent triangles, the upright ones and those upside down
     let mut sum = DVec3::ZERO;
     for i in 0..steps {
         for j in 0..steps - i {
             let at = |o: f32| {
                 let scale = 1.0 / steps as f32;
-                scene.emission(triangle, (i as f32 + o) * scale, (j as f32 + o) * scale).as_dvec3()
+                emission(scene, triangle, (i as f32 + o) * scale, (j as f32 + o) * scale).as_dvec3()
             };
             sum += at(1.0 / 3.0);
             if i + j + 1 < steps {
@@ -402,7 +412,7 @@ fn rectangle_light(scene: &Scene, first: &AreaLight, second: &AreaLight, right_c
         triangles: [first.triangles[0], second.triangles[0]],
         right_corner,
         radiance: mean.as_vec3(),
-        textured: first.textured,
+        varies: first.varies,
         both_faces: first.both_faces,
     }
 }
