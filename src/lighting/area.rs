@@ -1,10 +1,12 @@
 //! Light sources with area: single triangles, and rectangles made of two.
 
-use glam::{DVec3, Vec2, Vec3};
+use std::f64::consts::TAU;
+
+use glam::{DMat3, DVec3, Vec2, Vec3};
 
 use super::spherical::{Rectangle, Triangle, uniform_triangle};
 use crate::backend::Hit;
-use crate::scene::Scene;
+use crate::scene::{Alpha, Material, Scene, TextureSlot};
 
 /// How far from a right angle (cosine) and from a parallelogram (share of the shorter side) two triangles may be to count
 /// as a rectangle.
@@ -17,6 +19,10 @@ const FAR_SQUARED: f64 = 1e4;
 
 /// Smallest solid angle that is sampled as such; the f64 formulas are good to about 1e-15 sr.
 const MIN_SOLID_ANGLE: f64 = 1e-7;
+
+/// A point that sees a light source under a hemisphere less this solid angle is on it, as far as positions tell: its
+/// distance is less than about 1e-9 of the light's size.
+const ON_THE_LIGHT: f64 = 1e-9;
 
 /// Texture samples along one side of a triangle, at most.
 const MAX_TEXTURE_STEPS: u32 = 512;
@@ -41,7 +47,8 @@ pub(super) struct AreaLight {
     right_corner: [u8; 2],
     /// Mean emitted radiance.
     pub radiance: Vec3,
-    textured: bool,
+    /// Whether the radiance differs from point to point.
+    varies: bool,
     /// Whether the clockwise side emits, too.
     pub both_faces: bool,
 }
@@ -59,7 +66,8 @@ pub(super) struct AreaPoint {
 #[derive(Clone, Copy, Debug)]
 enum View {
     Area,
-    Rectangle(Rectangle, f64),
+    /// In its frame: columns are its axes and the direction from the point of view to its plane.
+    Rectangle(Rectangle, DMat3, f64),
     Triangle(Triangle, f64),
 }
 
@@ -79,6 +87,12 @@ impl AreaLight {
         self.cross.normalize_or_zero()
     }
 
+    /// First corner.
+    #[cfg(test)]
+    pub(super) fn first_corner(&self) -> DVec3 {
+        self.corner
+    }
+
     /// Centre of gravity and largest distance from it.
     pub(super) fn sphere(&self) -> (Vec3, f32) {
         (self.centre.as_vec3(), self.radius as f32)
@@ -93,7 +107,7 @@ impl AreaLight {
 
     /// Radiance emitted at a point of one of its triangles.
     pub(super) fn radiance_at(&self, scene: &Scene, point: &AreaPoint) -> Vec3 {
-        if self.textured { scene.emission(point.triangle, point.uv.x, point.uv.y) } else { self.radiance }
+        if self.varies { emission(scene, point.triangle, point.uv.x, point.uv.y) } else { self.radiance }
     }
 
     /// A uniform point; continuous in `u` on rectangles.
@@ -102,22 +116,30 @@ impl AreaLight {
         self.at(if self.is_rectangle() { u } else { uniform_triangle(u) })
     }
 
-    /// A point as seen from `position`, and its density per solid angle. `None` from the dark side or from edge-on.
-    pub(super) fn sample(&self, position: DVec3, u: [f32; 2]) -> Option<(AreaPoint, f64)> {
+    /// A point as seen from `position`, its offset from there, and its density per solid angle. `None` from the dark
+    /// side or from edge-on. The offset keeps its direction where the difference of the points would be lost in rounding.
+    pub(super) fn sample(&self, position: DVec3, u: [f32; 2]) -> Option<(AreaPoint, DVec3, f64)> {
         let view = self.view(position)?;
-        let (point, density) = match view {
+        Some(match view {
             View::Area => {
                 let point = self.uniform_point(u);
-                (point, self.area_density(point.position - position)?)
+                let offset = point.position - position;
+                (point, offset, self.area_density(offset)?)
             }
-            View::Rectangle(rectangle, angle) => {
+            View::Rectangle(rectangle, axes, angle) => {
                 let [x, y] = rectangle.sample(angle, u.map(f64::from));
                 let share = |v: f64, [v0, v1]: [f64; 2]| ((v - v0) / (v1 - v0)).clamp(0.0, 1.0);
-                (self.at([share(x, rectangle.x), share(y, rectangle.y)]), 1.0 / angle)
+                let point = self.at([share(x, rectangle.x), share(y, rectangle.y)]);
+                (point, axes * DVec3::new(x, y, rectangle.z), 1.0 / angle)
             }
-            View::Triangle(triangle, angle) => (self.at(triangle.sample(angle, u.map(f64::from))), 1.0 / angle),
-        };
-        Some((point, density))
+            View::Triangle(triangle, angle) => {
+                let (direction, weights) = triangle.sample(angle, u.map(f64::from));
+                let distance = (self.corner - position).dot(self.cross) / direction.dot(self.cross);
+                // No point is farther than the corners; a direction within rounding of the plane may say so (or NaN)
+                let distance = distance.abs().min(triangle.farthest());
+                (self.at(weights), distance * direction, 1.0 / angle)
+            }
+        })
     }
 
     /// Density per solid angle with which [`AreaLight::sample`] chooses the point at `offset` from `position`.
@@ -125,7 +147,7 @@ impl AreaLight {
         match self.view(position) {
             None => 0.0,
             Some(View::Area) => self.area_density(offset).unwrap_or(0.0),
-            Some(View::Rectangle(_, angle) | View::Triangle(_, angle)) => 1.0 / angle,
+            Some(View::Rectangle(_, _, angle) | View::Triangle(_, angle)) => 1.0 / angle,
         }
     }
 
@@ -157,12 +179,15 @@ impl AreaLight {
             let z = side.abs() / self.area;
             let rectangle = Rectangle { x: [x0, x0 + lengths[0]], y: [y0, y0 + lengths[1]], z };
             let angle = rectangle.solid_angle();
-            (View::Rectangle(rectangle, angle), angle)
+            (View::Rectangle(rectangle, DMat3::from_cols(x, y, -side.signum() * normal), angle), angle)
         } else {
             let triangle = Triangle::new(corner, self.edges, self.cross);
             let angle = triangle.solid_angle();
             (View::Triangle(triangle, angle), angle)
         };
+        if angle > TAU - ON_THE_LIGHT {
+            return None;
+        }
         // Also where NaN
         Some(if angle >= MIN_SOLID_ANGLE { view } else { View::Area })
     }
@@ -260,36 +285,45 @@ fn triangle_light(scene: &Scene, triangle: u32) -> Option<AreaLight> {
         triangles: [triangle, Hit::NONE],
         right_corner: [0; 2],
         radiance,
-        textured: material.emission_texture.is_some(),
+        varies: varies(material),
         both_faces: material.double_sided,
     })
 }
 
+/// Whether emission or presence differ from point to point.
+fn varies(material: &Material) -> bool {
+    material.emission_texture.is_some() || material.alpha != Alpha::Opaque
+}
+
+/// Radiance emitted at a point, weighted with the probability that the surface is there: shadow rays end before it, and
+/// do not ask.
+fn emission(scene: &Scene, triangle: u32, u: f32, v: f32) -> Vec3 {
+    scene.emission(triangle, u, v) * scene.opacity(triangle, u, v)
+}
+
 /// Mean of the radiance emitted by a triangle: one sample a texel along its sides.
 fn mean_radiance(scene: &Scene, triangle: u32) -> Vec3 {
-    let mesh = &scene.mesh;
-    let material = &scene.materials[mesh.object(triangle).material as usize];
-    let Some(slot) = &material.emission_texture else {
+    let material = scene.material(triangle);
+    if !varies(material) {
         return material.emission;
-    };
-    let uvs = &mesh.uvs[usize::from(slot.uv_set)];
-    let steps = if uvs.is_empty() {
-        1
-    } else {
+    }
+    let side_in_texels = |slot: &TextureSlot| {
         let texture = &scene.textures[slot.texture as usize];
         let size = Vec2::new(texture.width as f32, texture.height as f32);
-        let [a, b, c] =
-            mesh.triangles[triangle as usize].map(|v| slot.transform.transform_point2(uvs[v as usize]) * size);
-        let side = a.distance(b).max(b.distance(c)).max(c.distance(a));
-        (side.ceil() as u32).clamp(1, MAX_TEXTURE_STEPS)
+        let at = |u, v| slot.transform.transform_point2(scene.uv(slot.uv_set, triangle, u, v)) * size;
+        let (a, b, c) = (at(0.0, 0.0), at(1.0, 0.0), at(0.0, 1.0));
+        a.distance(b).max(b.distance(c)).max(c.distance(a))
     };
+    let alpha = material.base_color_texture.as_ref().filter(|_| material.alpha != Alpha::Opaque);
+    let side = material.emission_texture.iter().chain(alpha).map(side_in_texels).fold(1.0, f32::max);
+    let steps = (side.ceil() as u32).min(MAX_TEXTURE_STEPS);
     // Centres of steps^2 congruent triangles, the upright ones and those upside down
     let mut sum = DVec3::ZERO;
     for i in 0..steps {
         for j in 0..steps - i {
             let at = |o: f32| {
                 let scale = 1.0 / steps as f32;
-                scene.emission(triangle, (i as f32 + o) * scale, (j as f32 + o) * scale).as_dvec3()
+                emission(scene, triangle, (i as f32 + o) * scale, (j as f32 + o) * scale).as_dvec3()
             };
             sum += at(1.0 / 3.0);
             if i + j + 1 < steps {
@@ -378,7 +412,7 @@ fn rectangle_light(scene: &Scene, first: &AreaLight, second: &AreaLight, right_c
         triangles: [first.triangles[0], second.triangles[0]],
         right_corner,
         radiance: mean.as_vec3(),
-        textured: first.textured,
+        varies: first.varies,
         both_faces: first.both_faces,
     }
 }

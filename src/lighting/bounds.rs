@@ -4,12 +4,13 @@
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
-use glam::{Quat, Vec3};
+use glam::Vec3;
 
 use crate::scene::Aabb;
 
-/// Widening of united cones, radians: more than the rounding of the angles, so that no light falls outside.
-const CONE_MARGIN: f32 = 1e-5;
+/// Widening of cones around several lights, in the cosine: the sine of an angle whose cosine is 1 to rounding is only known
+/// to 3e-4, and no light may fall outside.
+const COS_MARGIN: f32 = 2e-4;
 
 /// Least squared distance in estimates. Keeps them finite at a light's own position; far below any scene's resolution.
 const MIN_DISTANCE_SQUARED: f32 = 1e-20;
@@ -31,33 +32,18 @@ impl Cone {
     /// All directions.
     pub(super) const SPHERE: Cone = Cone { axis: Vec3::Z, cos_o: -1.0, cos_e: 0.0, both: false };
 
-    /// The smallest cone (nearly) around both.
-    pub(super) fn union(self, other: Cone) -> Cone {
-        let cos_e = self.cos_e.min(other.cos_e);
-        let both = self.both || other.both;
-        let (a, mut b) = if self.cos_o <= other.cos_o { (self, other) } else { (other, self) };
-        if both && a.axis.dot(b.axis) < 0.0 {
-            b.axis = -b.axis;
-        }
-        let wide = Cone { cos_e, both, ..Cone::SPHERE };
-        if a.cos_o <= -1.0 {
-            return wide;
-        }
-        if a.axis == b.axis {
-            return Cone { cos_e, both, ..a };
-        }
-        let (theta_a, theta_b) = (a.cos_o.acos(), b.cos_o.clamp(-1.0, 1.0).acos());
-        let theta_d = a.axis.angle_between(b.axis);
-        if theta_d + theta_b <= theta_a {
-            return Cone { cos_e, both, ..a };
-        }
-        let theta_o = 0.5 * (theta_a + theta_d + theta_b) + CONE_MARGIN;
-        let turn = a.axis.cross(b.axis).normalize_or_zero();
-        if theta_o >= PI || turn == Vec3::ZERO {
-            return wide;
-        }
-        let axis = (Quat::from_axis_angle(turn, theta_o - theta_a) * a.axis).normalize();
-        Cone { axis, cos_o: theta_o.cos(), cos_e, both }
+    /// Opens the cone, the axis stays, until it holds `other`. Without trigonometry.
+    pub(super) fn widen(&mut self, other: &Cone) {
+        let cos_d = self.axis.dot(other.axis);
+        let cos_d = if self.both { cos_d.abs() } else { cos_d }.clamp(-1.0, 1.0);
+        // cos(d + o), or -1 beyond pi
+        let cos = if cos_d < -other.cos_o {
+            -1.0
+        } else {
+            cos_d * other.cos_o - ((1.0 - cos_d * cos_d) * (1.0 - other.cos_o * other.cos_o)).max(0.0).sqrt()
+        };
+        self.cos_o = self.cos_o.min(cos);
+        self.cos_e = self.cos_e.min(other.cos_e);
     }
 
     /// Solid angle of the directions, weighted by the cosine of the angle beyond `theta_o` (Conty and Kulla, eq. 1).
@@ -80,23 +66,63 @@ pub(super) struct Bounds {
 }
 
 impl Bounds {
-    pub(super) const EMPTY: Bounds =
-        Bounds { aabb: Aabb::EMPTY, cone: Cone { axis: Vec3::Z, cos_o: 1.0, cos_e: 1.0, both: false }, power: 0.0 };
+    /// Bounds of all. `all` is gone through twice.
+    pub(super) fn around<'a>(all: impl Iterator<Item = &'a Bounds> + Clone) -> Bounds {
+        let mut sum = BoundsSum::default();
+        all.clone().for_each(|b| sum.add(b));
+        let mut bounds = sum.start();
+        all.for_each(|b| bounds.cone.widen(&b.cone));
+        bounds.finish()
+    }
 
-    pub(super) fn union(self, other: Bounds) -> Bounds {
-        if self.aabb.is_empty() {
-            return other;
+    /// After the second pass.
+    pub(super) fn finish(mut self) -> Bounds {
+        if self.cone.cos_o < 1.0 {
+            self.cone.cos_o = (self.cone.cos_o - COS_MARGIN).max(-1.0);
         }
-        if other.aabb.is_empty() {
-            return self;
-        }
-        Bounds { aabb: self.aabb.union(other.aabb), cone: self.cone.union(other.cone), power: self.power + other.power }
+        self
+    }
+
+    /// Whether it bounds nothing.
+    pub(super) fn is_empty(&self) -> bool {
+        self.aabb.is_empty()
     }
 
     /// Cost of descending into this group, up to a factor that all splits of a node share. The squared diagonal stands for the
     /// surface area: it does not vanish for lights in a row.
     pub(super) fn cost(&self) -> f32 {
         if self.aabb.is_empty() { 0.0 } else { self.power * self.cone.measure() * self.aabb.size().length_squared() }
+    }
+}
+
+/// First of two passes that bound a group: everything but the width of the cone.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct BoundsSum {
+    aabb: Aabb,
+    power: f32,
+    first: Vec3,
+    axes: Vec3,
+    both: bool,
+}
+
+impl BoundsSum {
+    /// First pass.
+    pub(super) fn add(&mut self, bounds: &Bounds) {
+        let cone = &bounds.cone;
+        if self.aabb.is_empty() {
+            self.first = cone.axis;
+        }
+        self.aabb = self.aabb.union(bounds.aabb);
+        self.power += bounds.power;
+        self.both |= cone.both;
+        // Which way a two-sided light points does not matter
+        self.axes += if cone.both && self.first.dot(cone.axis) < 0.0 { -cone.axis } else { cone.axis };
+    }
+
+    /// Bounds whose cone holds only the mean axis, to be widened in the second pass.
+    pub(super) fn start(&self) -> Bounds {
+        let axis = self.axes.try_normalize().unwrap_or(Vec3::Z);
+        Bounds { aabb: self.aabb, cone: Cone { axis, cos_o: 1.0, cos_e: 1.0, both: self.both }, power: self.power }
     }
 }
 
@@ -112,6 +138,10 @@ pub(super) struct Emitter {
 }
 
 impl Emitter {
+    /// Emits nothing.
+    pub(super) const NOTHING: Emitter =
+        Emitter { centre: Vec3::ZERO, radius: 0.0, cone: Cone::SPHERE, power: 0.0, flat: false };
+
     /// From bounds: the sphere around the box.
     pub(super) fn of(bounds: &Bounds) -> Emitter {
         Emitter {

@@ -67,7 +67,7 @@ impl Lights {
         let dropped = areas.dropped + scene.lights.len() - directional.len() - finite.len();
         let of = |v: Vec3| v.as_dvec3().to_array();
         let directional_power = shares_of_total(directional.iter().map(|l| of(l.intensity)).collect());
-        let tree = LightTree::new(leaves(&areas.lights, &finite));
+        let tree = LightTree::new(&leaves(&areas.lights, &finite));
         let mut lights =
             Lights { areas, finite, directional, directional_power, tree, emission: FluxTable::default(), dropped };
         lights.emission = FluxTable::new(&lights, &scene.mesh.bounds);
@@ -112,8 +112,7 @@ impl Lights {
             });
         };
         let from = position.as_dvec3();
-        let (point, density) = area.sample(from, [u[1], u[2]])?;
-        let offset = point.position - from;
+        let (point, offset, density) = area.sample(from, [u[1], u[2]])?;
         let distance = offset.length();
         let direction = (offset / distance).as_vec3();
         let pdf = density * probability;
@@ -265,7 +264,6 @@ fn leaves(areas: &[AreaLight], finite: &[PunctualLight]) -> Vec<Leaf> {
             Leaf {
                 bounds: Bounds { aabb, cone, power },
                 emitter: Emitter { centre, radius, cone, power, flat: i < areas.len() },
-                light: i as u32,
             }
         })
         .collect()

@@ -53,7 +53,8 @@ impl Rectangle {
         // their cu / sqrt(1 - cu^2) with b0^2 - 1 = -z^2 / h0^2 put in, so that nothing cancels twice
         let below = f * f - (z / h0) * (z / h0);
         let x = if below > 0.0 { f.signum() * z / below.sqrt() } else { f.signum() * f64::INFINITY };
-        let x = x.clamp(x0, x1);
+        // 0 / 0 where an end of the range is seen along the plane
+        let x = if x.is_nan() { if u[0] < 0.5 { x0 } else { x1 } } else { x.clamp(x0, x1) };
         let d2 = x * x + z * z;
         let (s0, s1) = (y0 / (d2 + y0 * y0).sqrt(), y1 / (d2 + y1 * y1).sqrt());
         let s = s0 + u[1] * (s1 - s0);
@@ -90,18 +91,23 @@ impl Triangle {
         2.0 * self.triple.atan2(1.0 + self.a.dot(self.b) + self.b.dot(self.c) + self.c.dot(self.a))
     }
 
-    /// Barycentric weights of the second and third corner at `u`, uniform in solid angle. `solid_angle` is that of this
-    /// triangle.
+    /// Distance of the farthest corner.
+    pub(super) fn farthest(&self) -> f64 {
+        self.lengths.into_iter().fold(0.0, f64::max)
+    }
+
+    /// A unit direction into the triangle, uniform in solid angle, and the barycentric weights of the second and third
+    /// corner there. `solid_angle` is that of this triangle.
     ///
     /// Arvo (1995), pbrt 4ed 6.5.4: the first number cuts off a part of the area through the second corner, the second
     /// moves along the cut. The cut is found with half-angle tangents in Van Oosterom and Strackee's formula, which
     /// gives the same map as Arvo's and needs no interior angles: those of slivers are inexact.
-    pub(super) fn sample(&self, solid_angle: f64, u: [f64; 2]) -> [f64; 2] {
+    pub(super) fn sample(&self, solid_angle: f64, u: [f64; 2]) -> (DVec3, [f64; 2]) {
         let Triangle { a, b, c, triple, lengths } = *self;
         let out_of_edge = a.cross(c);
         let sin_b = out_of_edge.length();
         if sin_b == 0.0 {
-            return [1.0 / 3.0, 1.0 / 3.0];
+            return (b, [1.0, 0.0]);
         }
         // Along the edge from a to c: cos s a + sin s e. tan(area / 2) = t T / (1 + a.b + t b.e) with t = tan(s / 2)
         let e = out_of_edge.cross(a) / sin_b;
@@ -118,7 +124,7 @@ impl Triangle {
         let wb = (w.dot(c.cross(a)) / lengths[1]).abs();
         let wc = (w.dot(a.cross(b)) / lengths[2]).abs();
         let sum = wa + wb + wc;
-        if sum > 0.0 { [wb / sum, wc / sum] } else { [1.0 / 3.0, 1.0 / 3.0] }
+        (w, if sum > 0.0 { [wb / sum, wc / sum] } else { [1.0, 0.0] })
     }
 }
 

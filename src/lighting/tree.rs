@@ -1,8 +1,9 @@
 //! A bounding volume hierarchy over light sources, to choose one in proportion to what it may contribute.
 
-use super::bounds::{Bounds, Emitter};
-
 use glam::Vec3;
+
+use super::bounds::{Bounds, BoundsSum, Emitter};
+use crate::scene::Aabb;
 
 /// Up to so many lights are compared one by one.
 const FLAT: usize = 16;
@@ -19,18 +20,20 @@ pub(super) struct Leaf {
     pub bounds: Bounds,
     /// Tighter than the bounds.
     pub emitter: Emitter,
-    /// Number of the light.
-    pub light: u32,
 }
 
 #[derive(Clone, Copy, Debug)]
 struct Node {
     emitter: Emitter,
     parent: u32,
-    /// Inner nodes: the second child (the first comes right after the node). Leaves: the first slot.
+    /// Inner nodes: the first child, the second comes right after it. Leaves: the first slot.
     index: u32,
     /// Number of lights in a leaf; 0 for inner nodes.
     count: u32,
+}
+
+impl Node {
+    const NEW: Node = Node { emitter: Emitter::NOTHING, parent: NONE, index: 0, count: 0 };
 }
 
 /// Chooses lights in proportion to their estimated importance.
@@ -46,11 +49,13 @@ pub(super) struct LightTree {
 
 impl LightTree {
     /// A tree over lights numbered `0..leaves.len()`.
-    pub(super) fn new(mut leaves: Vec<Leaf>) -> Self {
+    pub(super) fn new(leaves: &[Leaf]) -> Self {
         let mut tree = LightTree { slot_of_light: vec![[0; 2]; leaves.len()], ..LightTree::default() };
         if !leaves.is_empty() {
             let limit = if leaves.len() <= FLAT { FLAT } else { LEAF };
-            tree.build(&mut leaves, NONE, limit);
+            let mut order: Vec<u32> = (0..leaves.len() as u32).collect();
+            tree.nodes.push(Node::NEW);
+            tree.build(leaves, &mut order, 0, limit);
         }
         tree
     }
@@ -68,25 +73,26 @@ impl LightTree {
         }
     }
 
-    fn build(&mut self, leaves: &mut [Leaf], parent: u32, limit: usize) {
-        let bounds = leaves.iter().fold(Bounds::EMPTY, |b, l| b.union(l.bounds));
-        let number = self.nodes.len() as u32;
-        let slot = self.emitters.len() as u32;
-        let count = if leaves.len() <= limit { leaves.len() as u32 } else { 0 };
-        self.nodes.push(Node { emitter: Emitter::of(&bounds), parent, index: slot, count });
-        if count > 0 {
-            for leaf in leaves {
-                self.slot_of_light[leaf.light as usize] = [self.emitters.len() as u32, number];
-                self.emitters.push(leaf.emitter);
-                self.light_of_slot.push(leaf.light);
+    fn build(&mut self, leaves: &[Leaf], order: &mut [u32], number: usize, limit: usize) {
+        let bounds = Bounds::around(order.iter().map(|&i| &leaves[i as usize].bounds));
+        self.nodes[number].emitter = Emitter::of(&bounds);
+        if order.len() <= limit {
+            self.nodes[number].index = self.emitters.len() as u32;
+            self.nodes[number].count = order.len() as u32;
+            for &light in order.iter() {
+                self.slot_of_light[light as usize] = [self.emitters.len() as u32, number as u32];
+                self.emitters.push(leaves[light as usize].emitter);
+                self.light_of_slot.push(light);
             }
             return;
         }
-        let middle = split(leaves);
-        let (first, second) = leaves.split_at_mut(middle);
-        self.build(first, number, limit);
-        self.nodes[number as usize].index = self.nodes.len() as u32;
-        self.build(second, number, limit);
+        let child = self.nodes.len();
+        self.nodes[number].index = child as u32;
+        self.nodes.extend([Node { parent: number as u32, ..Node::NEW }; 2]);
+        let middle = split(leaves, order);
+        let (first, second) = order.split_at_mut(middle);
+        self.build(leaves, first, child, limit);
+        self.build(leaves, second, child + 1, limit);
     }
 
     /// Chooses a light with `u` in 0..1; returns it with its probability.
@@ -98,16 +104,16 @@ impl LightTree {
         let mut number = 0;
         let mut node = self.nodes.first()?;
         while node.count == 0 {
-            let children = [number + 1, node.index as usize];
-            let [p0, p1] = self.shares(children, position, normal)?;
+            let child = node.index as usize;
+            let [p0, p1] = self.shares(child, position, normal)?;
             number = if u < p0 {
                 u /= p0;
                 probability *= p0;
-                children[0]
+                child
             } else {
                 u = ((u - p0) / p1).min(1.0 - f64::EPSILON);
                 probability *= p1;
-                children[1]
+                child + 1
             };
             node = &self.nodes[number];
         }
@@ -119,7 +125,7 @@ impl LightTree {
             *value = emitter.importance(position, normal);
             sum += f64::from(*value);
         }
-        if !(sum > 0.0) {
+        if sum <= 0.0 {
             return None;
         }
         let mut rest = u * sum;
@@ -156,18 +162,19 @@ impl LightTree {
         probability /= sum;
         while number != 0 && probability > 0.0 {
             let parent = self.nodes[number as usize].parent;
-            let children = [parent as usize + 1, self.nodes[parent as usize].index as usize];
-            let Some(shares) = self.shares(children, position, normal) else {
+            let child = self.nodes[parent as usize].index;
+            let Some(shares) = self.shares(child as usize, position, normal) else {
                 return 0.0;
             };
-            probability *= shares[usize::from(number as usize == children[1])];
+            probability *= shares[(number - child) as usize];
             number = parent;
         }
         probability
     }
 
-    fn shares(&self, children: [usize; 2], position: Vec3, normal: Vec3) -> Option<[f64; 2]> {
-        let [a, b] = children.map(|c| f64::from(self.nodes[c].emitter.importance(position, normal)));
+    /// How probable the two children starting at `child` are.
+    fn shares(&self, child: usize, position: Vec3, normal: Vec3) -> Option<[f64; 2]> {
+        let [a, b] = [child, child + 1].map(|c| f64::from(self.nodes[c].emitter.importance(position, normal)));
         let sum = a + b;
         (sum > 0.0).then(|| [a / sum, b / sum])
     }
@@ -175,45 +182,41 @@ impl LightTree {
 
 /// Sorts the lights into two groups and returns the size of the first: the cheapest of the planes between buckets, or halves
 /// where all lights are in one place.
-fn split(leaves: &mut [Leaf]) -> usize {
-    let centre = |leaf: &Leaf| leaf.bounds.aabb.centre();
-    let centres = crate::scene::Aabb::of(leaves.iter().map(centre));
+fn split(leaves: &[Leaf], order: &mut [u32]) -> usize {
+    let bounds = |i: u32| &leaves[i as usize].bounds;
+    let centres = Aabb::of(order.iter().map(|&i| bounds(i).aabb.centre()));
     let size = centres.size();
     let longest = size.max_element();
-    let bucket = |leaf: &Leaf, axis: usize| {
-        let share = (centre(leaf)[axis] - centres.min[axis]) / size[axis];
+    let bucket = |i: u32, axis: usize| {
+        let share = (bounds(i).aabb.centre()[axis] - centres.min[axis]) / size[axis];
         ((share * BUCKETS as f32) as usize).min(BUCKETS - 1)
     };
     let mut best: Option<(f32, usize, usize)> = None;
     for axis in (0..3).filter(|&a| size[a] > 0.0) {
-        let mut buckets = [Bounds::EMPTY; BUCKETS];
-        for leaf in leaves.iter() {
-            let b = &mut buckets[bucket(leaf, axis)];
-            *b = b.union(leaf.bounds);
+        let mut sums = [BoundsSum::default(); BUCKETS];
+        for &i in order.iter() {
+            sums[bucket(i, axis)].add(bounds(i));
         }
-        let mut above = [0.0; BUCKETS];
-        let mut group = Bounds::EMPTY;
-        for i in (1..BUCKETS).rev() {
-            group = group.union(buckets[i]);
-            above[i] = group.cost();
+        let mut buckets = sums.map(|s| s.start());
+        for &i in order.iter() {
+            buckets[bucket(i, axis)].cone.widen(&bounds(i).cone);
         }
-        group = Bounds::EMPTY;
-        for i in 1..BUCKETS {
-            group = group.union(buckets[i - 1]);
+        let full = || (0..BUCKETS).filter(|&i| !buckets[i].is_empty());
+        for plane in full().skip(1) {
+            let [below, above] = [0..plane, plane..BUCKETS]
+                .map(|part| Bounds::around(buckets[part].iter().filter(|b| !b.is_empty())).cost());
             // Thin boxes are to be cut across (Conty and Kulla's regularity factor)
-            let cost = (longest / size[axis]) * (group.cost() + above[i]);
+            let cost = (longest / size[axis]) * (below + above);
             if best.is_none_or(|(least, ..)| cost < least) {
-                best = Some((cost, axis, i));
+                best = Some((cost, axis, plane));
             }
         }
     }
-    let middle = match best {
-        None => 0,
-        Some((_, axis, plane)) => {
-            // Stable, so that the result does not depend on the sorting algorithm
-            leaves.sort_by_key(|leaf| bucket(leaf, axis) >= plane);
-            leaves.partition_point(|leaf| bucket(leaf, axis) < plane)
-        }
+    let Some((_, axis, plane)) = best else {
+        return order.len() / 2;
     };
-    if middle == 0 || middle == leaves.len() { leaves.len() / 2 } else { middle }
+    let (first, second): (Vec<u32>, Vec<u32>) = order.iter().partition(|&&i| bucket(i, axis) < plane);
+    order[..first.len()].copy_from_slice(&first);
+    order[first.len()..].copy_from_slice(&second);
+    first.len()
 }

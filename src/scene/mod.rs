@@ -60,4 +60,3 @@ pub struct ImportNotes {
     /// One sentence for each thing the user should know, without repetition.
     pub warnings: Vec<String>,
 }
-
