@@ -39,3 +39,28 @@ pub enum LightKind {
         direction: Vec3,
     },
 }
+
+impl PunctualLight {
+    /// Whether all values are possible.
+    pub(super) fn check(&self) -> Result<(), String> {
+        let fail = |what: String| Err(format!("light '{}': {what}", self.name));
+        if !(self.intensity.is_finite() && self.intensity.min_element() >= 0.0) {
+            return fail(format!("the intensity is {}, must be finite and not negative", self.intensity));
+        }
+        let (position, direction) = match self.kind {
+            LightKind::Point { position } => (position, Vec3::Z),
+            LightKind::Spot { position, direction, cos_inner, cos_outer } => {
+                // The extension demands 0 <= inner < outer <= 90 degrees.
+                if !(cos_inner <= 1.0 && cos_inner > cos_outer && cos_outer > -1e-6) {
+                    return fail("the cone angles must be 0 <= inner < outer <= 90 degrees".into());
+                }
+                (position, direction)
+            }
+            LightKind::Directional { direction } => (Vec3::ZERO, direction),
+        };
+        if !position.is_finite() || !direction.is_normalized() {
+            return fail("position or direction is not finite".into());
+        }
+        Ok(())
+    }
+}

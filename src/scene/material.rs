@@ -13,6 +13,9 @@ pub struct TextureSlot {
     pub transform: Affine2,
 }
 
+/// Largest perceptual roughness of a surface that transmits like a mirror reflects: lobes under a tenth of a degree wide.
+pub const MAX_SMOOTH_ROUGHNESS: f32 = 0.03;
+
 /// What alpha means for a material.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Alpha {
@@ -119,5 +122,58 @@ impl Material {
     /// Whether it is Lambertian everywhere: no specular lobe, no transmission, no metal.
     pub fn is_lambertian(&self) -> bool {
         self.metallic == 0.0 && self.specular == 0.0 && self.transmission == 0.0
+    }
+
+    /// Whether it transmits light without scattering it: glass with a surface as smooth as a mirror's.
+    pub fn transmits_smoothly(&self) -> bool {
+        self.transmission > 0.0 && self.metallic < 1.0 && self.roughness <= MAX_SMOOTH_ROUGHNESS && !self.is_emitter()
+    }
+
+    /// All textures that it reads.
+    pub fn texture_slots(&self) -> impl Iterator<Item = &TextureSlot> {
+        let slots = [
+            &self.base_color_texture,
+            &self.metallic_roughness_texture,
+            &self.normal_texture,
+            &self.emission_texture,
+        ];
+        slots.into_iter().flatten()
+    }
+
+    /// Whether all values are possible; `textures` is the number of textures of the scene.
+    pub(super) fn check(&self, textures: usize) -> Result<(), String> {
+        let zero_one = |name: &str, values: &[f32]| match values.iter().all(|v| (0.0..=1.0).contains(v)) {
+            true => Ok(()),
+            false => Err(format!("material '{}': {name} is {values:?}, must lie in 0..=1", self.name)),
+        };
+        let at_least = |name: &str, values: &[f32], least: f32| match values.iter().all(|v| *v >= least && v.is_finite())
+        {
+            true => Ok(()),
+            false => Err(format!("material '{}': {name} is {values:?}, must be finite and >= {least}", self.name)),
+        };
+        zero_one("the base colour (reflectance)", &self.base_color.to_array())?;
+        zero_one("the opacity", &[self.opacity])?;
+        zero_one("metallic", &[self.metallic])?;
+        zero_one("roughness", &[self.roughness])?;
+        zero_one("specular", &[self.specular])?;
+        zero_one("transmission", &[self.transmission])?;
+        zero_one("the attenuation colour", &self.attenuation_color.to_array())?;
+        at_least("the specular colour", &self.specular_color.to_array(), 0.0)?;
+        at_least("the emission", &self.emission.to_array(), 0.0)?;
+        at_least("the index of refraction", &[self.ior], 1.0)?;
+        at_least("the scale of the normal map", &[self.normal_scale], f32::MIN)?;
+        if let Alpha::Mask { cutoff } = self.alpha {
+            at_least("the alpha cutoff", &[cutoff], 0.0)?;
+        }
+        if self.attenuation_distance.is_nan() || self.attenuation_distance <= 0.0 {
+            let d = self.attenuation_distance;
+            return Err(format!("material '{}': the attenuation distance is {d}, must be positive", self.name));
+        }
+        for slot in self.texture_slots() {
+            if slot.texture as usize >= textures || slot.uv_set > 1 || !slot.transform.is_finite() {
+                return Err(format!("material '{}': impossible use of texture {}", self.name, slot.texture));
+            }
+        }
+        Ok(())
     }
 }

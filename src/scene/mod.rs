@@ -1,21 +1,31 @@
 //! What a scene is: triangles, materials, textures, lights and cameras, as read from glTF or made in code.
 
 pub mod aabb;
+pub mod alpha;
+pub mod appearance;
+pub mod builder;
 pub mod camera;
+mod clean;
+mod finish;
 pub mod gltf;
 pub mod light;
 pub mod material;
 pub mod mesh;
+mod overview;
+mod pane;
 pub mod texture;
 
 use glam::DVec3;
 
 pub use aabb::Aabb;
+pub use alpha::AlphaFilter;
+pub use builder::{GeometryId, MeshData, SceneBuilder};
 pub use camera::{Camera, Projection};
+pub use gltf::{LoadOptions, load};
 pub use light::{LightKind, PunctualLight};
 pub use material::{Alpha, Material, TextureSlot};
 pub use mesh::{Mesh, Object};
-pub use texture::Texture;
+pub use texture::{Texels, Texture, Wrap};
 
 /// A complete scene in recentred world coordinates (metres unless the file says otherwise, y up).
 #[derive(Clone, Debug, Default)]

@@ -1,0 +1,98 @@
+//! From scene-referred radiance to what a screen shows: exposure, tone curve, sRGB encoding.
+
+use super::buffer::Image;
+
+/// How radiance outside of the range of a screen is treated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ViewTransform {
+    /// Clipped at 1, then sRGB-encoded: exact where the image is not overexposed.
+    Srgb,
+    /// AgX by Troy Sobotka (2022), with Benjamin Wrensch's polynomial for its sigmoid ("Minimal AgX Implementation",
+    /// 2023): 16.5 stops from 2^-12.47 to 2^4.03, 10 below mid-grey and 6.5 above, colours bleached towards the top
+    /// instead of turning to the primaries.
+    #[default]
+    Filmic,
+}
+
+/// AgX works with the logarithm of radiance between these.
+const AGX_STOPS: [f32; 2] = [-12.473_93, 4.026_069];
+
+/// Rows: AgX's inset of the Rec. 709 primaries, which keeps bright saturated light from clipping in one band.
+const AGX_INSET: [[f32; 3]; 3] = [
+    [0.842_479_1, 0.078_433_6, 0.079_223_75],
+    [0.042_328_24, 0.878_468_64, 0.079_166_13],
+    [0.042_375_655, 0.078_433_6, 0.879_143],
+];
+
+/// Rows: the inverse of [`AGX_INSET`].
+const AGX_OUTSET: [[f32; 3]; 3] = [
+    [1.196_879, -0.098_020_88, -0.099_029_74],
+    [-0.052_896_85, 1.151_903_1, -0.098_961_18],
+    [-0.052_971_635, -0.098_043_45, 1.151_073_7],
+];
+
+impl ViewTransform {
+    /// Linear Rec. 709 radiance to values of 0..1 encoded for an sRGB screen. Negative and undefined radiance is
+    /// black, infinite radiance is white.
+    pub fn encode(self, rgb: [f32; 3]) -> [f32; 3] {
+        let rgb = rgb.map(|value| value.max(0.0)); // max() also turns NaN into 0
+        match self {
+            ViewTransform::Srgb => rgb.map(|value| srgb_encode(value.min(1.0))),
+            ViewTransform::Filmic => {
+                // Infinity would meet the negative entries of the outset as NaN; the curve is flat long before.
+                let inset = multiply(&AGX_INSET, rgb.map(|value| value.min(1e6)));
+                multiply(&AGX_OUTSET, inset.map(agx_curve)).map(|value| value.clamp(0.0, 1.0))
+            }
+        }
+    }
+}
+
+/// AgX's sigmoid over log2 of the radiance; the result is display-encoded.
+fn agx_curve(value: f32) -> f32 {
+    let [low, high] = AGX_STOPS;
+    let x = ((value.max(f32::MIN_POSITIVE).log2() - low) / (high - low)).clamp(0.0, 1.0);
+    let polynomial = [15.5, -40.14, 31.96, -6.868, 0.4298, 0.1191, -0.00232];
+    polynomial.into_iter().fold(0.0, |sum, coefficient| sum * x + coefficient)
+}
+
+fn multiply(matrix: &[[f32; 3]; 3], v: [f32; 3]) -> [f32; 3] {
+    matrix.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2])
+}
+
+/// Linear 0..1 to sRGB-encoded 0..1 (IEC 61966-2-1).
+pub fn srgb_encode(linear: f32) -> f32 {
+    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
+}
+
+/// sRGB-encoded 0..1 to linear 0..1 (IEC 61966-2-1).
+pub fn srgb_decode(encoded: f32) -> f32 {
+    if encoded <= 0.040_45 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
+}
+
+/// Luminance of linear Rec. 709 colour, in the unit of its bands.
+pub fn luminance(rgb: [f32; 3]) -> f64 {
+    0.2126 * f64::from(rgb[0]) + 0.7152 * f64::from(rgb[1]) + 0.0722 * f64::from(rgb[2])
+}
+
+/// Share of the pixels that [`auto_exposure`] disregards: the darkest, and the brightest, among which are the light
+/// sources.
+const TAILS: [f64; 2] = [0.01, 0.05];
+
+/// Exposure in stops that brings the geometric mean of the luminance to mid-grey, 0.18 (the log-average of Reinhard et
+/// al. 2002), between two percentiles and without black and undefined pixels. 0 if nothing is left.
+pub fn auto_exposure(image: &Image) -> f32 {
+    let Some([r, g, b]) = image.rgb_or_grey() else { return 0.0 };
+    let mut logarithms: Vec<f64> = (0..image.pixels())
+        .map(|i| luminance([r[i], g[i], b[i]]))
+        .filter(|luminance| luminance.is_finite() && *luminance > 0.0)
+        .map(f64::log2)
+        .collect();
+    logarithms.sort_by(f64::total_cmp);
+    let count = logarithms.len() as f64;
+    let kept = &logarithms[(count * TAILS[0]) as usize..logarithms.len() - (count * TAILS[1]) as usize];
+    if kept.is_empty() {
+        return 0.0;
+    }
+    let mean = kept.iter().sum::<f64>() / kept.len() as f64;
+    (0.18f64.log2() - mean) as f32
+}
