@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::buffers::Buffers;
 use super::json::valid;
-use crate::image::{PixelData, Pixels, decode_texture};
+use crate::image::{Data, Pixels, decode_texture};
 use crate::scene::texture::srgb_to_linear;
 use crate::scene::{SceneBuilder, Texels, Texture, TextureSlot, Wrap};
 
@@ -71,8 +71,8 @@ impl<'a> Textures<'a> {
             let name = name(root, image);
             let fail = |e: String| format!("image {image} '{name}': {e}");
             let pixels = decode_texture(&name, &bytes(root, buffers, image).map_err(fail)?).map_err(fail)?;
-            let texels = texels(pixels.data, coding);
-            Ok(Texture { name, width: pixels.width, height: pixels.height, texels, wrap })
+            let (width, height) = (pixels.width, pixels.height);
+            Ok(Texture { name, width, height, texels: texels(pixels, coding), wrap })
         });
         // Collected before the first error is taken, so that the message does not depend on the threads.
         let decoded: Vec<Result<Texture, String>> = decoded.collect();
@@ -83,18 +83,18 @@ impl<'a> Textures<'a> {
     }
 }
 
-fn texels(data: PixelData, coding: Coding) -> Texels {
-    match (data, coding) {
-        (PixelData::U8(bytes), Coding::Color) => Texels::Srgb8(bytes),
-        (PixelData::U8(bytes), Coding::Data) => Texels::Linear8(bytes),
-        (PixelData::F32(values), Coding::Data) => Texels::Float(values),
-        // Images of more than eight bits are encoded all the same.
-        (PixelData::F32(mut values), Coding::Color) => {
+fn texels(pixels: Pixels, coding: Coding) -> Texels {
+    match (pixels.data, coding) {
+        (Data::U8(bytes), Coding::Color) => Texels::Srgb8(bytes),
+        (Data::U8(bytes), Coding::Data) => Texels::Linear8(bytes),
+        // Integers of more than eight bits are encoded all the same.
+        (Data::F32(mut values), Coding::Color) if !pixels.floating_point => {
             for rgba in values.chunks_exact_mut(4) {
                 rgba[..3].iter_mut().for_each(|v| *v = srgb_to_linear(*v));
             }
             Texels::Float(values)
         }
+        (Data::F32(values), _) => Texels::Float(values),
     }
 }
 
