@@ -101,12 +101,11 @@ impl LightTree {
             return Some((0, 1.0));
         }
         let mut probability = 1.0;
-        let mut number = 0;
         let mut node = self.nodes.first()?;
         while node.count == 0 {
             let child = node.index as usize;
             let [p0, p1] = self.shares(child, position, normal)?;
-            number = if u < p0 {
+            let number = if u < p0 {
                 u /= p0;
                 probability *= p0;
                 child
