@@ -1,6 +1,7 @@
 //! Finds Embree 4, binds the headers of what was found and compiles the batch shim.
 //!
-//! Dependents read `DEP_EMBREE4_INCLUDE`, and `DEP_EMBREE4_RPATH` where the loader would not find the library alone.
+//! Dependents read `DEP_EMBREE4_INCLUDE`; `DEP_EMBREE4_RPATH` where the loader would not find the library alone; and
+//! `DEP_EMBREE4_TBB`, the TBB that lies beside it, if there is one.
 
 use std::env;
 use std::path::{Path, PathBuf};
@@ -21,10 +22,10 @@ fn find() -> Result<Embree, String> {
     };
     if let Some(root) = env::var_os("EMBREE_DIR").map(PathBuf::from) {
         return ["lib", "lib64"].iter().find_map(|lib| at(&root, lib)).ok_or_else(|| {
-            format!("EMBREE_DIR={} has no include/embree4/rtcore.h and lib/libembree4.so", root.display())
+            format!("EMBREE_DIR={} has no include/embree4/rtcore.h and lib/libembree4.so: correct it, or unset it and run scripts/setup.sh", root.display())
         });
     }
-    let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let workspace = PathBuf::from(env::var_os("CARGO_MANIFEST_DIR").unwrap_or_default()).join("../..");
     let workspace = workspace.canonicalize().unwrap_or(workspace);
     if let Some(found) = at(&workspace.join(".deps/embree"), "lib") {
         return Ok(found);
@@ -43,15 +44,26 @@ fn find() -> Result<Embree, String> {
     ))
 }
 
+fn bundled_tbb(lib: &Path) -> Option<PathBuf> {
+    let is_tbb = |path: &PathBuf| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        name.starts_with("libtbb") && !name.starts_with("libtbbmalloc") && name.contains(".so.")
+    };
+    std::fs::read_dir(lib).ok()?.flatten().map(|entry| entry.path()).filter(is_tbb).min()
+}
+
 fn main() {
     println!("cargo:rerun-if-env-changed=EMBREE_DIR");
     for path in ["build.rs", "shim.cpp", "shim.h"] {
         println!("cargo:rerun-if-changed={path}");
     }
-    let embree = find().unwrap_or_else(|reason| {
+    // `cargo::error` fails the build by itself, with this one line.
+    if let Err(reason) = find().and_then(|embree| build(&embree)) {
         println!("cargo::error={reason}");
-        std::process::exit(1);
-    });
+    }
+}
+
+fn build(embree: &Embree) -> Result<(), String> {
     println!("cargo:rerun-if-changed={}", embree.include.join("embree4").display());
 
     // The shim comes before the library it uses on the linker's command line.
@@ -70,6 +82,9 @@ fn main() {
     println!("cargo:include={}", embree.include.display());
     if !embree.in_system {
         println!("cargo:rpath={}", embree.lib.display());
+        if let Some(tbb) = bundled_tbb(&embree.lib) {
+            println!("cargo:tbb={}", tbb.display());
+        }
         // For this package's own tests; a dependent's binaries need the same from its build script.
         println!("cargo:rustc-link-arg=-Wl,-rpath,{}", embree.lib.display());
     }
@@ -84,13 +99,7 @@ fn main() {
         .derive_default(true)
         .layout_tests(true)
         .generate()
-        .unwrap_or_else(|reason| {
-            println!("cargo::error=cannot bind Embree's headers, run scripts/setup.sh: {reason}");
-            std::process::exit(1);
-        });
+        .map_err(|reason| format!("cannot bind Embree's headers, run scripts/setup.sh: {reason}"))?;
     let out = PathBuf::from(env::var_os("OUT_DIR").unwrap_or_default()).join("bindings.rs");
-    if let Err(reason) = bindings.write_to_file(&out) {
-        println!("cargo::error=cannot write {}: {reason}", out.display());
-        std::process::exit(1);
-    }
+    bindings.write_to_file(&out).map_err(|reason| format!("cannot write {}: {reason}", out.display()))
 }

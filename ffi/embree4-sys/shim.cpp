@@ -1,6 +1,7 @@
 /* C++ only because Embree's accessors for packets of any size (RTCRayN_dir_x ...) are; no exceptions, no library. */
 #include "shim.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
@@ -72,6 +73,9 @@ bool usable(const gsii_embree_ray* ray) {
     return zero == 0.0f && directed && ray->t_far >= ray->t_near;
 }
 
+/* A hit at t = 0 does not count: that is where the ray starts. Embree's interval is closed. */
+float positive(float t_near) { return t_near > FLT_MIN ? t_near : FLT_MIN; }
+
 /* t is a rounded quotient and can leave the interval by a unit in the last place. */
 float within(float t, const gsii_embree_ray* ray) {
     return t < ray->t_near ? ray->t_near : t > ray->t_far ? ray->t_far : t;
@@ -83,7 +87,7 @@ void load(RTCRay* out, const gsii_embree_ray* ray, unsigned int mask) {
     out->org_x = ray->origin[0];
     out->org_y = ray->origin[1];
     out->org_z = ray->origin[2];
-    out->tnear = ray->t_near > 0.0f ? ray->t_near : 0.0f;
+    out->tnear = positive(ray->t_near);
     out->dir_x = ray->direction[0];
     out->dir_y = ray->direction[1];
     out->dir_z = ray->direction[2];
@@ -141,7 +145,7 @@ void load8(RTCRay8* out, int* valid, const gsii_embree_ray* rays, size_t n, unsi
         out->org_x[k] = ray->origin[0];
         out->org_y[k] = ray->origin[1];
         out->org_z[k] = ray->origin[2];
-        out->tnear[k] = ray->t_near > 0.0f ? ray->t_near : 0.0f;
+        out->tnear[k] = positive(ray->t_near);
         out->dir_x[k] = ray->direction[0];
         out->dir_y[k] = ray->direction[1];
         out->dir_z[k] = ray->direction[2];

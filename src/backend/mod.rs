@@ -18,7 +18,8 @@ use glam::Vec3;
 use crate::error::Result;
 
 /// A ray and the part of it that counts, `t_near <= t <= t_far`, in units of the length of `direction`
-/// (unit length wherever a distance is meant).
+/// (unit length wherever a distance is meant). A hit at `t = 0` never counts: that is where the ray starts.
+/// Hits within a few units in the last place of `t_near` or `t_far` may count or not.
 ///
 /// Rays with NaN or infinite parts (but for `t_far`), without a direction or with `t_far < t_near` hit nothing.
 #[repr(C)]
@@ -26,8 +27,7 @@ use crate::error::Result;
 pub struct Ray {
     /// Start point, in scene coordinates.
     pub origin: Vec3,
-    /// Smallest parameter at which a hit counts; negative is taken as 0, at which a ray that starts on a triangle
-    /// hits it.
+    /// Smallest parameter at which a hit counts; negative is taken as 0.
     pub t_near: f32,
     /// Direction.
     pub direction: Vec3,
@@ -161,7 +161,10 @@ pub enum Visible {
     OnlyPanes,
 }
 
-/// A hint on how much neighbouring rays of a batch have in common. Never changes the result.
+/// A hint on how much neighbouring rays of a batch have in common. Changes the result no more than rounding does.
+///
+/// Embree takes coherent rays through the tree in packets of eight: 2 to 3 times as fast when the hint is right, half as
+/// fast when it is wrong. Order camera rays by small blocks of pixels, not by rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Coherence {
     /// Neighbours start close together and run nearly parallel (camera rays, shadow rays to one light).

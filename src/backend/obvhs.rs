@@ -126,7 +126,7 @@ impl ObvhsScene {
             Visible::OnlyPanes => primitive.kind == PartKind::Pane,
         };
         let met = seen.then(|| meet_plane(ray, primitive.corners)).flatten().filter(|met| met.inside())?;
-        if met.t < f64::from(ray.t_near).max(0.0) || met.t > f64::from(ray.t_far) {
+        if met.t <= 0.0 || met.t < f64::from(ray.t_near) || met.t > f64::from(ray.t_far) {
             return None;
         }
         let [_, u, v] = met.weights.map(|weight| weight as f32);
