@@ -6,7 +6,7 @@ use glam::vec3;
 
 use crate::office::Office;
 use crate::paint::{BLACK, BRASS, DARK_STEEL, MOUNT, STEEL, TACKS, WALNUT};
-use crate::primitives::{ALL_FACES, BOTTOM, Z_HIGH, Z_LOW, bevelled, block, cuboid, curve, frame, lathe, loft, tube};
+use crate::primitives::{ALL_FACES, BOTTOM, Z_HIGH, Z_LOW, block, cuboid, curve, frame, lathe, loft, tube};
 use crate::scene::Pose;
 
 /// Adds the radio, its front towards +z.
@@ -16,7 +16,7 @@ pub fn add(office: &mut Office, parent: Option<usize>, pose: Pose) {
     let n = office.around(20);
     let front = d / 2.0;
     let middle = foot + h / 2.0;
-    let mut body = vec![(WALNUT, bevelled(w, h, d, 0.006, true).moved(0.0, foot, 0.0))];
+    let mut body = vec![(WALNUT, office.bevelled(w, h, d, 0.006, true).moved(0.0, foot, 0.0))];
     for x in [-0.14, 0.14] {
         body.push((BLACK, block(0.03, foot - 0.0003, 0.08, ALL_FACES & !BOTTOM).moved(x, 0.0, 0.0)));
     }
@@ -39,7 +39,7 @@ pub fn add(office: &mut Office, parent: Option<usize>, pose: Pose) {
     ];
     body.push((
         DARK_STEEL,
-        tube(&curve(&handle, office.steps(4)), |_| 0.006, office.around(14)).moved(0.0, foot + h + 0.0003, 0.0),
+        tube(&curve(&handle, office.steps(5)), |_| 0.006, office.around(14)).moved(0.0, foot + h + 0.0003, 0.0),
     ));
     office.thing(radio, "radio case", Pose::at(0.0, 0.0, 0.0), body);
 

@@ -6,13 +6,16 @@ use glam::vec3;
 
 use crate::office::{GAP, Office};
 use crate::paint::{RUG, RUG_BAND};
-use crate::primitives::{ALL_FACES, BOTTOM, bevelled, cuboid, curve, tube};
+use crate::primitives::{ALL_FACES, BOTTOM, cuboid, curve, tube};
 use crate::scene::Pose;
 
 /// Length along x and width along z, metres.
-const SIZE: (f32, f32) = (2.3, 1.6);
+const SIZE: (f32, f32) = (2.6, 2.3);
 /// Thickness.
 const HEIGHT: f32 = 0.010;
+
+/// Height at which what stands on the rug and its bands begins.
+pub const ON_RUG: f32 = HEIGHT + 0.001 + GAP;
 
 /// Adds the rug under the table.
 pub fn add(office: &mut Office) {
@@ -20,7 +23,7 @@ pub fn add(office: &mut Office) {
         return;
     }
     let rug = Some(office.scene.group(None, "rug", Pose::at(3.70, 0.0, 1.95).yaw(0.03)));
-    office.thing(rug, "rug", Pose::at(0.0, 0.0, 0.0), [(RUG, bevelled(SIZE.0, HEIGHT, SIZE.1, 0.003, false))]);
+    office.thing(rug, "rug", Pose::at(0.0, 0.0, 0.0), [(RUG, office.bevelled(SIZE.0, HEIGHT, SIZE.1, 0.003, false))]);
     let band = |inset: f32, width: f32| {
         let (x, z) = (SIZE.0 / 2.0 - inset, SIZE.1 / 2.0 - inset);
         let y = (HEIGHT + 0.0002, HEIGHT + 0.001);
@@ -41,7 +44,7 @@ pub fn add(office: &mut Office) {
 
 fn fringes(office: &mut Office, parent: Option<usize>) {
     let mut rng = office.rng("fringes");
-    let per_side = office.count(70).min(400);
+    let per_side = office.count(60).min(400);
     let n = office.around(5);
     let threads: Vec<usize> = (0..4)
         .map(|_| {
@@ -76,16 +79,17 @@ fn tufts(office: &mut Office, parent: Option<usize>) {
     }
     let mut rng = office.rng("tufts");
     let tile = 0.05;
-    let (columns, rows) = (36, 22);
+    let (columns, rows) = (42, 36);
     // The usual environment has none; from twice the clutter on their number grows with it.
-    let side = ((office.count(3) as f32).sqrt() as usize).clamp(1, 40);
+    let per_tile = office.count(3).min(1600);
+    let side = (per_tile as f32).sqrt().ceil() as usize;
     let n = office.around(3);
     let steps = office.steps(1);
     let pitch = tile / side as f32;
     let meshes: Vec<usize> = (0..4)
         .map(|_| {
             let mut all = crate::shape::Shape::default();
-            for i in 0..side * side {
+            for i in 0..per_tile {
                 let foot = vec3(pitch * ((i % side) as f32 + 0.5), 0.0, pitch * ((i / side) as f32 + 0.5));
                 let lean = vec3(rng.around(0.3 * pitch), 0.0, rng.around(0.3 * pitch));
                 let path = [foot, foot + vec3(0.0, 0.003, 0.0) + 0.3 * lean, foot + vec3(0.0, 0.006, 0.0) + lean];

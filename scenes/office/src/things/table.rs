@@ -2,17 +2,16 @@
 
 use glam::vec3;
 
+use super::rug::ON_RUG;
 use super::{books, calculator, stationery};
 use crate::office::{GAP, Office};
 use crate::paint::{BEECH, CARDBOARD, DARK_STEEL, PORCELAIN, SKIRTING};
-use crate::primitives::{ALL_FACES, BOTTOM, TOP, bevelled, block, cuboid, cylinder};
+use crate::primitives::{ALL_FACES, BOTTOM, TOP, block, cuboid, cylinder};
 use crate::scene::Pose;
 use crate::shape::Shape;
 
 /// Height of the table's top, metres.
 const HEIGHT: f32 = 0.73;
-/// The rug underneath carries it.
-const ON_RUG: f32 = 0.012;
 
 /// Adds the table and a cardboard box on the floor.
 pub fn add(office: &mut Office) {
@@ -21,7 +20,7 @@ pub fn add(office: &mut Office) {
     }
     let table = Some(office.scene.group(None, "table", Pose::at(3.72, 0.0, 1.92).yaw(0.03)));
     let n = office.around(18);
-    let top = bevelled(1.40, 0.025, 0.78, 0.004, true).moved(0.0, HEIGHT - 0.025, 0.0);
+    let top = office.bevelled(1.40, 0.025, 0.78, 0.004, true).moved(0.0, HEIGHT - 0.025, 0.0);
     let mut parts = vec![(BEECH, top)];
     for (x, z) in [(-0.62, -0.31), (0.62, -0.31), (-0.62, 0.31), (0.62, 0.31)] {
         parts.push((DARK_STEEL, cylinder(0.022, HEIGHT - 0.025 - ON_RUG - 2.0 * GAP, n).moved(x, ON_RUG + GAP, z)));
