@@ -6,7 +6,7 @@ use glam::vec3;
 
 use crate::office::{GAP, Office};
 use crate::paint::{RUG, RUG_BAND};
-use crate::primitives::{ALL_FACES, BOTTOM, cuboid, curve, tube};
+use crate::primitives::{ALL_FACES, BOTTOM, TOP, X_HIGH, X_LOW, cuboid, curve, tube};
 use crate::scene::Pose;
 
 /// Length along x and width along z, metres.
@@ -27,13 +27,14 @@ pub fn add(office: &mut Office) {
     let band = |inset: f32, width: f32| {
         let (x, z) = (SIZE.0 / 2.0 - inset, SIZE.1 / 2.0 - inset);
         let y = (HEIGHT + 0.0002, HEIGHT + 0.001);
-        let side =
-            |x0: f32, x1: f32, z0: f32, z1: f32| cuboid(vec3(x0, y.0, z0), vec3(x1, y.1, z1), ALL_FACES & !BOTTOM);
+        // The bands along z end at those along x.
+        let (whole, between) = (ALL_FACES & !BOTTOM, TOP | X_LOW | X_HIGH);
+        let side = |x0: f32, x1: f32, z0: f32, z1: f32, faces| cuboid(vec3(x0, y.0, z0), vec3(x1, y.1, z1), faces);
         [
-            side(-x, x, -z, -z + width),
-            side(-x, x, z - width, z),
-            side(-x, -x + width, -z + width, z - width),
-            side(x - width, x, -z + width, z - width),
+            side(-x, x, -z, -z + width, whole),
+            side(-x, x, z - width, z, whole),
+            side(-x, -x + width, -z + width, z - width, between),
+            side(x - width, x, -z + width, z - width, between),
         ]
     };
     let bands = band(0.07, 0.05).into_iter().chain(band(0.17, 0.015)).map(|shape| (RUG_BAND, shape));

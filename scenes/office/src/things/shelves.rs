@@ -5,7 +5,7 @@ use glam::vec3;
 use super::books;
 use crate::office::{GAP, Office};
 use crate::paint::BEECH;
-use crate::primitives::{ALL_FACES, BOTTOM, X_HIGH, X_LOW, Z_LOW, block, cuboid};
+use crate::primitives::{ALL_FACES, BOTTOM, X_HIGH, X_LOW, Z_HIGH, Z_LOW, block, cuboid};
 use crate::scene::Pose;
 
 /// Inner width and depth of a bookcase, metres.
@@ -46,11 +46,7 @@ fn carcass(office: &mut Office, parent: Option<usize>) {
         vec3(0.5 * w, height, -0.5 * d),
         ALL_FACES & !X_LOW & !X_HIGH & !Z_LOW,
     );
-    let plinth = cuboid(
-        vec3(-0.5 * w, 0.0, 0.5 * d - 0.04),
-        vec3(0.5 * w, 0.08, 0.5 * d - 0.025),
-        ALL_FACES & !X_LOW & !X_HIGH & !BOTTOM,
-    );
+    let plinth = cuboid(vec3(-0.5 * w, 0.0, 0.5 * d - 0.04), vec3(0.5 * w, 0.08, 0.5 * d - 0.025), Z_LOW | Z_HIGH);
     office.thing(
         parent,
         "bookcase sides",

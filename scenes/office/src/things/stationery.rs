@@ -252,7 +252,7 @@ pub fn add_desk(office: &mut Office, parent: Option<usize>) {
         let eraser = office.bevelled(0.045, 0.012, 0.02, 0.003, true);
         office.thing(parent, "eraser", Pose::at(-0.30, 0.0, 0.06).yaw(0.9), [(ERASER, eraser)]);
         let ruler = cuboid(vec3(-0.15, 0.0, -0.015), vec3(0.15, 0.0022, 0.015), ALL_FACES);
-        office.thing(parent, "ruler", Pose::at(-0.60, 0.0, -0.33).yaw(0.05), [(BARE_WOOD, ruler)]);
+        office.thing(parent, "ruler", Pose::at(-0.42, 0.0, -0.33).yaw(0.05), [(BARE_WOOD, ruler)]);
     }
 }
 

@@ -6,7 +6,7 @@ use super::rug::ON_RUG;
 use super::{books, calculator, stationery};
 use crate::office::{GAP, Office};
 use crate::paint::{BEECH, CARDBOARD, DARK_STEEL, PORCELAIN, SKIRTING};
-use crate::primitives::{ALL_FACES, BOTTOM, TOP, block, cuboid, cylinder};
+use crate::primitives::{ALL_FACES, BOTTOM, TOP, X_HIGH, X_LOW, block, cuboid, cylinder};
 use crate::scene::Pose;
 use crate::shape::Shape;
 
@@ -61,11 +61,11 @@ fn floppies(office: &mut Office, parent: Option<usize>, pose: Pose) {
     let group = Some(office.scene.group(parent, "floppy box", pose));
     let (w, h, d, t) = (0.10, 0.06, 0.16, 0.002);
     let walls = [
-        block(w, t, d, ALL_FACES & !BOTTOM),
-        block(w, h, t, ALL_FACES & !BOTTOM).moved(0.0, 0.0, 0.5 * (d + t)),
-        block(w, h, t, ALL_FACES & !BOTTOM).moved(0.0, 0.0, -0.5 * (d + t)),
-        block(t, h, d, ALL_FACES & !BOTTOM).moved(0.5 * (w + t), 0.0, 0.0),
-        block(t, h, d, ALL_FACES & !BOTTOM).moved(-0.5 * (w + t), 0.0, 0.0),
+        block(w, t, d, TOP),
+        block(w + 2.0 * t, h, t, ALL_FACES & !BOTTOM).moved(0.0, 0.0, 0.5 * (d + t)),
+        block(w + 2.0 * t, h, t, ALL_FACES & !BOTTOM).moved(0.0, 0.0, -0.5 * (d + t)),
+        block(t, h, d, TOP | X_LOW | X_HIGH).moved(0.5 * (w + t), 0.0, 0.0),
+        block(t, h, d, TOP | X_LOW | X_HIGH).moved(-0.5 * (w + t), 0.0, 0.0),
     ];
     office.thing(group, "floppy case", Pose::at(0.0, 0.0, 0.0), [(SKIRTING, Shape::of(walls))]);
     let colours = [crate::paint::BLACK, crate::paint::COVERS[7], crate::paint::COVERS[6], crate::paint::PUTTY];
@@ -96,7 +96,9 @@ fn floppies(office: &mut Office, parent: Option<usize>, pose: Pose) {
 fn carton(office: &mut Office) {
     let group = Some(office.scene.group(None, "carton", Pose::at(5.45, 0.0, 1.08).yaw(0.2)));
     let (w, h, d, t) = (0.42, 0.32, 0.32, 0.004);
-    let wall = |w: f32, d: f32, x: f32, z: f32| block(w, h, d, ALL_FACES & !BOTTOM).moved(x, 0.0, z);
+    let wall = |w: f32, d: f32, x: f32, z: f32| {
+        block(w, h, d, if x == 0.0 { ALL_FACES & !BOTTOM } else { TOP | X_LOW | X_HIGH }).moved(x, 0.0, z)
+    };
     let walls = Shape::of([
         block(w, t, d, TOP),
         wall(w + 2.0 * t, t, 0.0, 0.5 * (d + t)),
