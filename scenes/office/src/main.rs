@@ -74,7 +74,21 @@ fn run(args: &Args) -> Result<(), String> {
         Some(triangles) => level::for_triangles(triangles, args.seed),
     };
     let mut scene = office::Office::build(detail, args.seed);
-    let average = reflectance::paint_walls(&mut scene, args.reflectance.rho())?;
+    let wanted = args.reflectance.rho();
+    let average = reflectance::paint_walls(&mut scene, wanted);
+    if (average.rho() - wanted).abs() > reflectance::TOLERANCE {
+        // With other amounts of clutter the walls may be unable to make up for it; that is the user's choice.
+        let message = format!(
+            "the walls can bring the average reflectance to {:.3} only, not to {wanted}: they are {:.1} of {:.1} m2",
+            average.rho(),
+            average.wall_area,
+            average.wall_area + average.other_area
+        );
+        if args.detail.is_none() {
+            return Err(message);
+        }
+        eprintln!("note: {message}");
+    }
     save(&scene, &args.output).map_err(|error| format!("cannot write {}: {error}", args.output.display()))?;
     println!("surfaces             {}", scene.surface_count());
     println!("triangles            {}", scene.triangle_count());

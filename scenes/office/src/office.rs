@@ -3,6 +3,7 @@
 use glam::{Vec3, vec3};
 
 use crate::paint::Paint;
+use crate::primitives;
 use crate::rng::Rng;
 use crate::scene::{Camera, Pose, Scene};
 use crate::shape::Shape;
@@ -76,6 +77,16 @@ impl Office {
         self.detail.clutter >= clutter
     }
 
+    /// A box with chamfered edges ([`primitives::bevelled`]), plain where little detail is wanted.
+    pub fn bevelled(&self, width: f32, height: f32, depth: f32, bevel: f32, bottom: bool) -> Shape {
+        if self.shows(0.02) {
+            primitives::bevelled(width, height, depth, bevel, bottom)
+        } else {
+            let faces = if bottom { primitives::ALL_FACES } else { primitives::ALL_FACES & !primitives::BOTTOM };
+            primitives::block(width, height, depth, faces)
+        }
+    }
+
     /// Makes a mesh.
     pub fn mesh(&mut self, name: &str, parts: impl IntoIterator<Item = (Paint, Shape)>) -> usize {
         self.scene.mesh(name, parts)
@@ -97,9 +108,9 @@ impl Office {
 fn cameras() -> Vec<Camera> {
     let camera = |name, eye, target, y_fov| Camera { name, eye, target, y_fov, aspect: 1.5 };
     vec![
-        camera("overview", vec3(5.72, 1.62, 3.98), vec3(2.15, 0.98, 1.15), 47.0),
-        camera("desk", vec3(1.62, 1.32, 2.42), vec3(0.33, 0.93, 1.93), 38.0),
-        camera("pencils", vec3(1.12, 1.17, 2.86), vec3(0.48, 0.75, 2.47), 34.0),
-        camera("plant", vec3(1.62, 1.36, 1.75), vec3(0.60, 1.03, 0.25), 40.0),
+        camera("overview", vec3(5.74, 1.64, 4.02), vec3(2.35, 0.98, 1.05), 49.0),
+        camera("desk", vec3(1.66, 1.36, 2.42), vec3(0.40, 0.90, 1.93), 38.0),
+        camera("pencils", vec3(0.98, 1.04, 2.74), vec3(0.56, 0.765, 2.46), 30.0),
+        camera("plant", vec3(1.62, 1.36, 1.75), vec3(0.60, 1.05, 0.25), 32.0),
     ]
 }

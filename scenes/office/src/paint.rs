@@ -37,9 +37,9 @@ pub const CEILING_LIGHT: Paint = source("ceiling light", [14.0, 12.6, 10.6]);
 /// Desk lamp, warmer.
 pub const LAMP_LIGHT: Paint = source("lamp light", [16.0, 12.0, 8.0]);
 /// Overcast sky behind the window.
-pub const SKY: Paint = source("sky", [2.6, 3.0, 3.6]);
+pub const SKY: Paint = source("sky", [1.4, 1.6, 1.9]);
 
-pub const CARPET: Paint = solid("carpet", 0.19, 0.20, 0.23);
+pub const CARPET: Paint = solid("carpet", 0.29, 0.30, 0.33);
 pub const SKIRTING: Paint = solid("skirting", 0.72, 0.70, 0.66);
 pub const GRID: Paint = solid("ceiling grid", 0.80, 0.80, 0.78);
 pub const FIXTURE: Paint = solid("luminaire enamel", 0.85, 0.85, 0.84);

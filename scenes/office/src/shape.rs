@@ -49,12 +49,6 @@ impl Shape {
         self
     }
 
-    /// Adds a vertex.
-    pub fn vertex(&mut self, p: Vec3) -> u32 {
-        self.positions.push(p);
-        self.positions.len() as u32 - 1
-    }
-
     /// Adds a convex polygon, counter-clockwise seen from the front.
     pub fn polygon(&mut self, corners: &[Vec3]) {
         let base = self.positions.len() as u32;

@@ -28,9 +28,9 @@ pub fn add_bin(office: &mut Office) {
     let mut rng = office.rng("crumpled paper");
     let cuts = match office.steps(4) {
         0..=2 => 0,
-        3 => 1,
-        4..=7 => 2,
-        8..=15 => 3,
+        3..=7 => 1,
+        8..=11 => 2,
+        12..=19 => 3,
         _ => 4,
     };
     let radius = 0.036;

@@ -146,7 +146,7 @@ fn flat(office: &mut Office, parent: Option<usize>, rng: &mut Rng, pose: Pose, b
             scale: vec3(rng.range(0.8, 1.0), rng.range(0.9, 1.0), rng.range(0.9, 1.0)),
         };
         let size = book.size();
-        let slack = (reach - 0.5 * size.y - 0.012).max(0.0).min(0.008);
+        let slack = (reach - 0.5 * size.y - 0.012).clamp(0.0, 0.008);
         // Standing height becomes the x direction: turned by -90 degrees about z, it starts at the left.
         let at = Pose::at(-0.5 * size.y + rng.around(slack), y + 0.5 * size.x, rng.around(0.006));
         book.place(office, group, at.yaw(rng.around(0.04)).roll(-std::f32::consts::FRAC_PI_2));

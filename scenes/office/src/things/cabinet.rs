@@ -5,13 +5,15 @@ use glam::vec3;
 use super::{plant, radio};
 use crate::office::{GAP, Office};
 use crate::paint::{BEECH, CABINET, DARK_STEEL, PAPER, STEEL, solid};
-use crate::primitives::{ALL_FACES, BOTTOM, Z_LOW, bevelled, block, cuboid, curve, lathe, tube};
+use crate::primitives::{ALL_FACES, BOTTOM, Z_LOW, block, cuboid, curve, lathe, tube};
 use crate::scene::Pose;
 
 /// Adds both.
 pub fn add(office: &mut Office) {
     low(office);
-    filing(office);
+    if office.shows(0.006) {
+        filing(office);
+    }
 }
 
 fn low(office: &mut Office) {
@@ -19,19 +21,24 @@ fn low(office: &mut Office) {
     let (w, h, d) = (1.10, 0.72, 0.42);
     let body = block(w, h - 0.08 - 0.022, d, ALL_FACES).moved(0.0, 0.08, 0.0);
     let plinth = block(w - 0.06, 0.08 - GAP, d - 0.06, ALL_FACES & !BOTTOM);
-    let top = bevelled(w + 0.02, 0.022 - GAP, d + 0.02, 0.003, true).moved(0.0, h - 0.022 + GAP, 0.0);
+    let top = office.bevelled(w + 0.02, 0.022 - GAP, d + 0.02, 0.003, true).moved(0.0, h - 0.022 + GAP, 0.0);
     office.thing(group, "cabinet body", Pose::at(0.0, 0.0, 0.0), [(BEECH, body), (DARK_STEEL, plinth), (BEECH, top)]);
-    let door = office.mesh("cabinet door", [(BEECH, bevelled(0.535, 0.60, 0.016, 0.002, true))]);
+    let door = office.mesh("cabinet door", [(BEECH, office.bevelled(0.535, 0.60, 0.016, 0.002, true))]);
+    let knobs = office.shows(0.005);
     let knob = lathe(&[(0.006, 0.0), (0.005, 0.012), (0.013, 0.018), (0.013, 0.022), (0.0, 0.026)], office.around(16));
     let knob = office
         .mesh("cabinet knob", [(STEEL, knob.at(Pose::at(0.0, 0.0, 0.0).pitch(std::f32::consts::FRAC_PI_2).map()))]);
     for side in [-1.0, 1.0] {
         office.scene.place(group, "cabinet door", door, Pose::at(side * 0.271, 0.09, d / 2.0 + 0.0085));
-        office.scene.place(group, "cabinet knob", knob, Pose::at(side * 0.04, 0.50, d / 2.0 + 0.0168));
+        if knobs {
+            office.scene.place(group, "cabinet knob", knob, Pose::at(side * 0.04, 0.50, d / 2.0 + 0.0168));
+        }
     }
     let top = Some(office.scene.group(group, "on the cabinet", Pose::at(0.0, h + GAP, 0.0)));
     plant::add(office, top, Pose::at(-0.28, 0.0, 0.01));
-    radio::add(office, top, Pose::at(0.25, 0.0, 0.06).yaw(0.22));
+    if office.shows(0.01) {
+        radio::add(office, top, Pose::at(0.25, 0.0, 0.06).yaw(0.22));
+    }
 }
 
 fn filing(office: &mut Office) {
@@ -43,7 +50,7 @@ fn filing(office: &mut Office) {
         Pose::at(0.0, 0.0, 0.0),
         [(CABINET, block(w, h, d, ALL_FACES & !BOTTOM))],
     );
-    let front = office.mesh("file drawer", [(CABINET, bevelled(0.43, 0.305, 0.018, 0.003, true))]);
+    let front = office.mesh("file drawer", [(CABINET, office.bevelled(0.43, 0.305, 0.018, 0.003, true))]);
     let bow = [
         vec3(-0.05, 0.0, 0.0),
         vec3(-0.048, 0.0, 0.024),
@@ -51,7 +58,7 @@ fn filing(office: &mut Office) {
         vec3(0.048, 0.0, 0.024),
         vec3(0.05, 0.0, 0.0),
     ];
-    let handle = tube(&curve(&bow, office.steps(3)), |_| 0.005, office.around(14));
+    let handle = tube(&curve(&bow, office.steps(5)), |_| 0.005, office.around(14));
     let handle = office.mesh("file drawer handle", [(STEEL, handle)]);
     let holder = crate::primitives::frame(0.085, 0.04, 0.004, 0.003);
     let label = cuboid(vec3(-0.041, -0.018, 0.0), vec3(0.041, 0.018, 0.001), ALL_FACES & !Z_LOW);

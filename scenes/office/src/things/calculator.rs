@@ -4,16 +4,17 @@ use glam::vec3;
 
 use crate::office::{GAP, Office};
 use crate::paint::{DARK_STEEL, KEY, KEY_GREY, STEM, TACKS};
-use crate::primitives::{ALL_FACES, bevelled, cuboid};
+use crate::primitives::{ALL_FACES, BOTTOM, cuboid};
 use crate::scene::Pose;
 
 /// Adds a calculator lying down, its display away from +z.
 pub fn add(office: &mut Office, parent: Option<usize>, pose: Pose) {
     let group = Some(office.scene.group(parent, "calculator", pose));
-    let body = bevelled(0.13, 0.022, 0.18, 0.003, true);
-    let display = cuboid(vec3(-0.052, 0.022, -0.078), vec3(0.052, 0.0225, -0.05), ALL_FACES);
+    let body = office.bevelled(0.13, 0.022, 0.18, 0.003, true);
+    let display = cuboid(vec3(-0.052, 0.022, -0.078), vec3(0.052, 0.0225, -0.05), ALL_FACES & !BOTTOM);
     office.thing(group, "calculator body", Pose::at(0.0, 0.0, 0.0), [(DARK_STEEL, body), (STEM, display)]);
-    let key = |paint| [(paint, bevelled(0.016, 0.005, 0.012, 0.0012, false))];
+    let cap = office.bevelled(0.016, 0.005, 0.012, 0.0012, false);
+    let key = |paint| [(paint, cap.clone())];
     let keys = [
         office.mesh("calculator key", key(KEY)),
         office.mesh("calculator key", key(KEY_GREY)),

@@ -5,8 +5,7 @@ use glam::vec3;
 use crate::office::{GAP, Office};
 use crate::paint::{BLACK, FABRIC, PUTTY, PUTTY_DARK, RUBBER, SCREEN, SCREEN_BAR, SCREEN_TEXT};
 use crate::primitives::{
-    ALL_FACES, BOTTOM, Z_LOW, bevelled, block, cuboid, curve, cushion, lathe, loft, rounded_rectangle,
-    tube,
+    ALL_FACES, BOTTOM, Z_LOW, block, cuboid, curve, cushion, lathe, loft, rounded_rectangle, tube,
 };
 use crate::scene::Pose;
 
@@ -15,13 +14,14 @@ pub fn add(office: &mut Office, parent: Option<usize>, pose: Pose) {
     let computer = Some(office.scene.group(parent, "computer", pose));
     let foot = 0.008;
     let case_height = 0.105;
-    let case = bevelled(0.42, case_height, 0.40, 0.004, true).moved(0.0, foot, 0.0);
+    let case = office.bevelled(0.42, case_height, 0.40, 0.004, true).moved(0.0, foot, 0.0);
     let mut parts = vec![(PUTTY, case)];
-    for (x, z) in [(-0.18, -0.17), (0.18, -0.17), (-0.18, 0.17), (0.18, 0.17)] {
+    let fittings = office.shows(0.005);
+    for (x, z) in [(-0.18, -0.17), (0.18, -0.17), (-0.18, 0.17), (0.18, 0.17)].into_iter().filter(|_| fittings) {
         parts.push((RUBBER, block(0.03, foot - GAP, 0.03, ALL_FACES & !BOTTOM).moved(x, 0.0, z)));
     }
     // Two drive bays, a power button and a row of slits, all proud of the front.
-    for (x, y, w, h) in [(0.11, 0.062, 0.15, 0.03), (0.11, 0.022, 0.11, 0.022)] {
+    for (x, y, w, h) in [(0.11, 0.062, 0.15, 0.03), (0.11, 0.022, 0.11, 0.022)].into_iter().filter(|_| fittings) {
         parts
             .push((PUTTY_DARK, cuboid(vec3(x - w / 2.0, y, 0.2), vec3(x + w / 2.0, y + h, 0.203), ALL_FACES & !Z_LOW)));
         parts.push((
@@ -39,7 +39,9 @@ pub fn add(office: &mut Office, parent: Option<usize>, pose: Pose) {
     let stand = lathe(&[(0.0, 0.0), (0.13, 0.0), (0.13, 0.010), (0.09, 0.028), (0.0, 0.030)], n);
     office.thing(computer, "screen stand", Pose::at(0.0, foot + case_height + GAP, -0.02), [(PUTTY, stand)]);
     screen(office, computer, Pose::at(0.0, foot + case_height + 0.0335, -0.02).pitch(-0.03));
-    mouse(office, parent);
+    if office.shows(0.006) {
+        mouse(office, parent);
+    }
 }
 
 /// The tube monitor: bezel, recessed screen with a text window, tapering back with cooling slits.
@@ -128,14 +130,14 @@ fn screen(office: &mut Office, parent: Option<usize>, pose: Pose) {
     let n = office.around(16);
     let turn = Pose::at(0.0, 0.0, 0.0).pitch(quarter).map();
     let button = office.mesh("screen button", [(PUTTY_DARK, crate::primitives::peg(0.006, 0.005, n).at(turn))]);
-    for i in 0..4 {
+    for i in 0..office.count(400).min(4) {
         office.scene.place(screen, "screen button", button, Pose::at(0.08 + 0.022 * i as f32, 0.022, front));
     }
 }
 
 fn mouse(office: &mut Office, parent: Option<usize>) {
-    let k = office.steps(3);
-    let pad = bevelled(0.23, 0.004, 0.19, 0.001, false);
+    let k = office.steps(4);
+    let pad = office.bevelled(0.23, 0.004, 0.19, 0.001, false);
     let body = cushion(0.062, 0.034, 0.105, 0.015, k);
     let button = cuboid(vec3(-0.0145, 0.0, -0.02), vec3(0.0145, 0.0012, 0.02), ALL_FACES & !BOTTOM);
     let x = 0.46;

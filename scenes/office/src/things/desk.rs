@@ -5,7 +5,7 @@ use glam::vec3;
 use super::{computer, keyboard, stationery, telephone};
 use crate::office::{GAP, Office};
 use crate::paint::{BLACK, DARK_STEEL, LAMP_LIGHT, OAK, PAPER, STEEL, WALNUT};
-use crate::primitives::{ALL_FACES, BOTTOM, bevelled, block, cuboid, curve, cylinder, lathe, tube};
+use crate::primitives::{ALL_FACES, BOTTOM, block, cuboid, curve, cylinder, lathe, tube};
 use crate::scene::Pose;
 
 /// Height of the desk's top, metres.
@@ -19,17 +19,19 @@ pub fn add(office: &mut Office) {
     let top = Some(office.scene.group(Some(desk), "on the desk", Pose::at(0.0, HEIGHT + GAP, 0.0)));
     computer::add(office, top, Pose::at(0.10, 0.0, -0.13).yaw(-0.06));
     keyboard::add(office, top, Pose::at(0.08, 0.0, 0.25).yaw(-0.03));
-    stationery::add_desk(office, top);
+    if office.shows(0.012) {
+        stationery::add_desk(office, top);
+    }
     if office.shows(0.05) {
         telephone::add(office, top, Pose::at(0.70, 0.0, -0.05).yaw(-0.35));
     }
     if office.shows(0.05) {
-        lamp(office, top, Pose::at(-0.74, 0.0, -0.26).yaw(0.35));
+        lamp(office, top, Pose::at(-0.79, 0.0, -0.30).yaw(0.35));
     }
 }
 
 fn furniture(office: &mut Office, parent: Option<usize>) {
-    let top = bevelled(1.80, 0.028, 0.80, 0.003, true).moved(0.0, HEIGHT - 0.028, 0.0);
+    let top = office.bevelled(1.80, 0.028, 0.80, 0.003, true).moved(0.0, HEIGHT - 0.028, 0.0);
     office.thing(parent, "desk top", Pose::at(0.0, 0.0, 0.0), [(OAK, top)]);
     let under = HEIGHT - 0.028 - GAP;
     let frame = [
@@ -40,9 +42,9 @@ fn furniture(office: &mut Office, parent: Option<usize>) {
         (DARK_STEEL, block(0.38, 0.0497, 0.62, ALL_FACES & !BOTTOM).moved(0.66, 0.0, 0.0)),
     ];
     office.thing(parent, "desk frame", Pose::at(0.0, 0.0, 0.0), frame);
-    let front = office.mesh("drawer front", [(WALNUT, bevelled(0.40, 0.185, 0.018, 0.003, true))]);
+    let front = office.mesh("drawer front", [(WALNUT, office.bevelled(0.40, 0.185, 0.018, 0.003, true))]);
     let n = office.around(16);
-    let steps = office.steps(3);
+    let steps = office.steps(5);
     let bow = [
         vec3(-0.06, 0.0, 0.0),
         vec3(-0.058, 0.0, 0.022),
@@ -83,7 +85,7 @@ fn lamp(office: &mut Office, parent: Option<usize>, pose: Pose) {
     let inner = [(0.0, 0.088), (0.042, 0.086), (0.069, 0.049), (0.080, 0.0)];
     let bulb = lathe(&[(0.0, 0.035), (0.03, 0.035)], n);
     let socket = lathe(&[(0.03, 0.0352), (0.018, 0.06), (0.018, 0.085)], n);
-    let tilt = Pose::at(head.x, head.y - 0.128, head.z).pitch(0.0);
+    let tilt = Pose::at(head.x, head.y - 0.128, head.z);
     office.thing(
         Some(lamp),
         "lamp head",

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::office::{GAP, Office};
 use crate::paint::{KEY, KEY_GREY, PUTTY};
-use crate::primitives::{bevelled, loft, rounded_rectangle};
+use crate::primitives::{loft, rounded_rectangle};
 use crate::scene::Pose;
 use crate::shape::Shape;
 
@@ -32,7 +32,7 @@ fn cap(units: f32, steps: usize) -> Shape {
 pub fn add(office: &mut Office, parent: Option<usize>, pose: Pose) {
     let keyboard = office.scene.group(parent, "keyboard", pose.turned(glam::Quat::from_rotation_x(0.05)));
     let lift = 0.0045;
-    let body = bevelled(22.5 * PITCH + 0.03, 0.018, 7.0 * PITCH + 0.016, 0.003, true).moved(0.0, lift, 0.0);
+    let body = office.bevelled(22.5 * PITCH + 0.03, 0.018, 7.0 * PITCH + 0.016, 0.003, true).moved(0.0, lift, 0.0);
     office.thing(Some(keyboard), "keyboard body", Pose::at(0.0, 0.0, 0.0), [(PUTTY, body)]);
     let steps = office.steps(1);
     let mut caps: BTreeMap<(u32, bool), usize> = BTreeMap::new();

@@ -12,7 +12,11 @@ pub fn add(office: &mut Office) {
     let panel = rectangle(0.52, 0.52).at(Pose::at(0.0, -0.01, 0.0).pitch(half_turn).map());
     // The frame stands with its open back on the ceiling and its front down.
     let rim = frame(0.57, 0.57, 0.026, 0.022).at(Pose::at(0.0, 0.0, 0.0).pitch(quarter).map());
-    let mesh = office.mesh("ceiling light", [(CEILING_LIGHT, panel), (FIXTURE, rim)]);
+    let mut parts = vec![(CEILING_LIGHT, panel)];
+    if office.shows(0.01) {
+        parts.push((FIXTURE, rim));
+    }
+    let mesh = office.mesh("ceiling light", parts);
     let lights = office.scene.group(None, "ceiling lights", Pose::at(0.0, 0.0, 0.0));
     for z in [0.9, 3.3] {
         for x in [0.9, 1.5, 4.5, 5.1] {

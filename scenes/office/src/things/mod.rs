@@ -36,9 +36,13 @@ pub fn furnish(office: &mut Office) {
     shelves::add(office);
     cabinet::add(office);
     table::add(office);
-    corkboard::add(office);
+    if office.shows(0.006) {
+        corkboard::add(office);
+    }
     pictures::add(office);
     clock::add(office);
     rug::add(office);
-    ball::add_bin(office);
+    if office.shows(0.008) {
+        ball::add_bin(office);
+    }
 }

@@ -27,15 +27,15 @@ pub fn add(office: &mut Office, parent: Option<usize>, pose: Pose) {
     let (across, along) = (office.steps(2), office.steps(6));
     let mut blades = Vec::new();
     for (paint, length, droop) in [
-        (LEAF, 0.15, 0.9),
-        (LEAF, 0.12, 1.3),
-        (LEAF, 0.17, 0.6),
-        (LEAF_LIGHT, 0.10, 0.8),
-        (LEAF_LIGHT, 0.13, 1.1),
+        (LEAF, 0.17, 0.9),
+        (LEAF, 0.14, 1.3),
+        (LEAF, 0.19, 0.6),
+        (LEAF_LIGHT, 0.12, 0.8),
+        (LEAF_LIGHT, 0.15, 1.1),
         (LEAF_DRY, 0.11, 1.8),
     ] {
         blades.push(
-            office.mesh("leaf", [(paint, leaf(length, 0.36 * length, 0.25, droop, across.max(2) / 2 * 2, along))]),
+            office.mesh("leaf", [(paint, leaf(length, 0.40 * length, 0.25, droop, across.max(2) / 2 * 2, along))]),
         );
     }
     let mut rng = office.rng("plant");

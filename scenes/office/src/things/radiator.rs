@@ -5,7 +5,7 @@ use glam::vec3;
 use super::room::WINDOW;
 use crate::office::{GAP, Office};
 use crate::paint::{STEEL, WHITE};
-use crate::primitives::{bar, bevelled, peg};
+use crate::primitives::{bar, peg};
 use crate::scene::Pose;
 
 /// Adds the radiator.
@@ -17,7 +17,7 @@ pub fn add(office: &mut Office) {
     let ribs = 22;
     let pitch = 0.055;
     let group = office.scene.group(None, "radiator", Pose::at(0.5 * (x0 + x1), 0.14, 0.085));
-    let rib = office.mesh("radiator rib", [(WHITE, bevelled(0.042, 0.56, 0.10, 0.008, true))]);
+    let rib = office.mesh("radiator rib", [(WHITE, office.bevelled(0.042, 0.56, 0.10, 0.008, true))]);
     for i in 0..ribs {
         let x = (i as f32 - 0.5 * (ribs - 1) as f32) * pitch;
         office.scene.place(Some(group), "radiator rib", rib, Pose::at(x, 0.0, 0.0));

@@ -4,9 +4,9 @@ use std::f32::consts::{FRAC_PI_2, TAU};
 
 use glam::vec3;
 
-use crate::office::Office;
+use crate::office::{GAP, Office};
 use crate::paint::{BLACK, BRASS, DARK_STEEL, MOUNT, STEEL, TACKS, WALNUT};
-use crate::primitives::{ALL_FACES, BOTTOM, Z_HIGH, Z_LOW, bevelled, block, cuboid, curve, frame, lathe, loft, tube};
+use crate::primitives::{ALL_FACES, BOTTOM, Z_HIGH, Z_LOW, block, cuboid, curve, frame, lathe, loft, tube};
 use crate::scene::Pose;
 
 /// Adds the radio, its front towards +z.
@@ -16,7 +16,7 @@ pub fn add(office: &mut Office, parent: Option<usize>, pose: Pose) {
     let n = office.around(20);
     let front = d / 2.0;
     let middle = foot + h / 2.0;
-    let mut body = vec![(WALNUT, bevelled(w, h, d, 0.006, true).moved(0.0, foot, 0.0))];
+    let mut body = vec![(WALNUT, office.bevelled(w, h, d, 0.006, true).moved(0.0, foot, 0.0))];
     for x in [-0.14, 0.14] {
         body.push((BLACK, block(0.03, foot - 0.0003, 0.08, ALL_FACES & !BOTTOM).moved(x, 0.0, 0.0)));
     }
@@ -39,7 +39,7 @@ pub fn add(office: &mut Office, parent: Option<usize>, pose: Pose) {
     ];
     body.push((
         DARK_STEEL,
-        tube(&curve(&handle, office.steps(4)), |_| 0.006, office.around(14)).moved(0.0, foot + h + 0.0003, 0.0),
+        tube(&curve(&handle, office.steps(5)), |_| 0.006, office.around(14)).moved(0.0, foot + h + 0.0003, 0.0),
     ));
     office.thing(radio, "radio case", Pose::at(0.0, 0.0, 0.0), body);
 
@@ -93,7 +93,7 @@ pub fn add(office: &mut Office, parent: Option<usize>, pose: Pose) {
     let knob = |r: f32| {
         let turn = Pose::at(0.0, 0.0, 0.0).pitch(FRAC_PI_2).map();
         let skirt = lathe(&[(1.15 * r, 0.0), (1.15 * r, 0.002), (0.0, 0.002)], n).at(turn);
-        let grip = loft(&[star(r, 0.0022), star(r, 0.016)], false, true).at(turn);
+        let grip = loft(&[star(r, 0.0022), star(r, 0.016), star(0.0, 0.016)], false, false).at(turn);
         [(BRASS, skirt), (MOUNT, grip)]
     };
     let (large, small) = (office.mesh("tuning knob", knob(0.021)), office.mesh("knob", knob(0.012)));
@@ -108,7 +108,8 @@ pub fn add(office: &mut Office, parent: Option<usize>, pose: Pose) {
     for i in 0..4 {
         let to = from + 0.11 * direction;
         aerial.push((STEEL, tube(&[from, to], |_| 0.0024 - 0.0004 * i as f32, office.around(14))));
-        from = to;
+        // A hair apart, so that the ends do not coincide.
+        from = to + GAP * direction;
     }
     aerial.push((STEEL, crate::primitives::ball(0.003, office.around(14)).moved(from.x, from.y, from.z)));
     office.thing(radio, "aerial", Pose::at(0.0, 0.0, 0.0), aerial);

@@ -53,7 +53,7 @@ fn window(office: &mut Office, parent: Option<usize>) {
     let (cx, cy) = (0.5 * (x0 + x1), 0.5 * (y0 + y1));
     // Behind the frame its open back would be seen from outside only.
     let outer = frame(w - 0.002, h - 0.002, 0.055, 0.05);
-    let post = cuboid(vec3(-0.03, -h / 2.0 + 0.056, 0.0), vec3(0.03, h / 2.0 - 0.056, 0.045), ALL_FACES & !Z_LOW);
+    let post = cuboid(vec3(-0.03, -h / 2.0 + 0.056, 0.0), vec3(0.03, h / 2.0 - 0.056, 0.045), X_LOW | X_HIGH | Z_HIGH);
     office.thing(parent, "window frame", Pose::at(cx, cy, -0.18), [(WHITE, outer), (WHITE, post)]);
     let sill = cuboid(vec3(-w / 2.0 - 0.05, 0.0, 0.0), vec3(w / 2.0 + 0.05, 0.03, 0.12), ALL_FACES & !Z_LOW);
     office.thing(parent, "window sill", Pose::at(cx, y0 - 0.031, 0.0), [(WHITE, sill)]);
@@ -73,8 +73,8 @@ fn skirting(office: &mut Office, parent: Option<usize>) {
     boards.join(cuboid(vec3(0.0, 0.0, ROOM.z - d), vec3(ROOM.x, h, ROOM.z), TOP | Z_LOW));
     boards.join(cuboid(vec3(0.0, 0.0, d), vec3(d, h, ROOM.z - d), TOP | X_HIGH));
     // The right wall's board stops at the door.
-    for (from, to) in [(d, DOOR_AT.0 - 0.07), (DOOR_AT.1 + 0.07, ROOM.z - d)] {
-        boards.join(cuboid(vec3(ROOM.x - d, 0.0, from), vec3(ROOM.x, h, to), TOP | X_LOW | Z_LOW | Z_HIGH));
+    for (from, to, end) in [(d, DOOR_AT.0 - 0.07, Z_HIGH), (DOOR_AT.1 + 0.07, ROOM.z - d, Z_LOW)] {
+        boards.join(cuboid(vec3(ROOM.x - d, 0.0, from), vec3(ROOM.x, h, to), TOP | X_LOW | end));
     }
     office.thing(parent, "skirting", Pose::at(0.0, 0.0, 0.0), [(SKIRTING, boards)]);
 }

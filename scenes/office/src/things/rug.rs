@@ -6,13 +6,16 @@ use glam::vec3;
 
 use crate::office::{GAP, Office};
 use crate::paint::{RUG, RUG_BAND};
-use crate::primitives::{ALL_FACES, BOTTOM, bevelled, cuboid, curve, tube};
+use crate::primitives::{ALL_FACES, BOTTOM, TOP, X_HIGH, X_LOW, cuboid, curve, tube};
 use crate::scene::Pose;
 
 /// Length along x and width along z, metres.
-const SIZE: (f32, f32) = (2.3, 1.6);
+const SIZE: (f32, f32) = (2.6, 2.3);
 /// Thickness.
 const HEIGHT: f32 = 0.010;
+
+/// Height at which what stands on the rug and its bands begins.
+pub const ON_RUG: f32 = HEIGHT + 0.001 + GAP;
 
 /// Adds the rug under the table.
 pub fn add(office: &mut Office) {
@@ -20,17 +23,18 @@ pub fn add(office: &mut Office) {
         return;
     }
     let rug = Some(office.scene.group(None, "rug", Pose::at(3.70, 0.0, 1.95).yaw(0.03)));
-    office.thing(rug, "rug", Pose::at(0.0, 0.0, 0.0), [(RUG, bevelled(SIZE.0, HEIGHT, SIZE.1, 0.003, false))]);
+    office.thing(rug, "rug", Pose::at(0.0, 0.0, 0.0), [(RUG, office.bevelled(SIZE.0, HEIGHT, SIZE.1, 0.003, false))]);
     let band = |inset: f32, width: f32| {
         let (x, z) = (SIZE.0 / 2.0 - inset, SIZE.1 / 2.0 - inset);
         let y = (HEIGHT + 0.0002, HEIGHT + 0.001);
-        let side =
-            |x0: f32, x1: f32, z0: f32, z1: f32| cuboid(vec3(x0, y.0, z0), vec3(x1, y.1, z1), ALL_FACES & !BOTTOM);
+        // The bands along z end at those along x.
+        let (whole, between) = (ALL_FACES & !BOTTOM, TOP | X_LOW | X_HIGH);
+        let side = |x0: f32, x1: f32, z0: f32, z1: f32, faces| cuboid(vec3(x0, y.0, z0), vec3(x1, y.1, z1), faces);
         [
-            side(-x, x, -z, -z + width),
-            side(-x, x, z - width, z),
-            side(-x, -x + width, -z + width, z - width),
-            side(x - width, x, -z + width, z - width),
+            side(-x, x, -z, -z + width, whole),
+            side(-x, x, z - width, z, whole),
+            side(-x, -x + width, -z + width, z - width, between),
+            side(x - width, x, -z + width, z - width, between),
         ]
     };
     let bands = band(0.07, 0.05).into_iter().chain(band(0.17, 0.015)).map(|shape| (RUG_BAND, shape));
@@ -41,7 +45,7 @@ pub fn add(office: &mut Office) {
 
 fn fringes(office: &mut Office, parent: Option<usize>) {
     let mut rng = office.rng("fringes");
-    let per_side = office.count(70).min(400);
+    let per_side = office.count(60).min(400);
     let n = office.around(5);
     let threads: Vec<usize> = (0..4)
         .map(|_| {
@@ -76,16 +80,17 @@ fn tufts(office: &mut Office, parent: Option<usize>) {
     }
     let mut rng = office.rng("tufts");
     let tile = 0.05;
-    let (columns, rows) = (36, 22);
+    let (columns, rows) = (42, 36);
     // The usual environment has none; from twice the clutter on their number grows with it.
-    let side = ((office.count(3) as f32).sqrt() as usize).clamp(1, 40);
+    let per_tile = office.count(3).min(1600);
+    let side = (per_tile as f32).sqrt().ceil() as usize;
     let n = office.around(3);
     let steps = office.steps(1);
     let pitch = tile / side as f32;
     let meshes: Vec<usize> = (0..4)
         .map(|_| {
             let mut all = crate::shape::Shape::default();
-            for i in 0..side * side {
+            for i in 0..per_tile {
                 let foot = vec3(pitch * ((i % side) as f32 + 0.5), 0.0, pitch * ((i / side) as f32 + 0.5));
                 let lean = vec3(rng.around(0.3 * pitch), 0.0, rng.around(0.3 * pitch));
                 let path = [foot, foot + vec3(0.0, 0.003, 0.0) + 0.3 * lean, foot + vec3(0.0, 0.006, 0.0) + lean];

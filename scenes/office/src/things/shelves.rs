@@ -5,7 +5,7 @@ use glam::vec3;
 use super::books;
 use crate::office::{GAP, Office};
 use crate::paint::BEECH;
-use crate::primitives::{ALL_FACES, BOTTOM, X_HIGH, X_LOW, Z_LOW, block, cuboid};
+use crate::primitives::{ALL_FACES, BOTTOM, X_HIGH, X_LOW, Z_HIGH, Z_LOW, block, cuboid};
 use crate::scene::Pose;
 
 /// Inner width and depth of a bookcase, metres.
@@ -18,9 +18,16 @@ const FLOORS: [f32; 7] = [0.08, 0.46, 0.82, 1.16, 1.48, 1.80, 2.10];
 /// Adds the bookcases with what stands in them.
 pub fn add(office: &mut Office) {
     for (case, x) in [3.70, 4.71].into_iter().enumerate() {
+        if case > 0 && !office.shows(0.003) {
+            continue;
+        }
         let group = Some(office.scene.group(None, "bookcase", Pose::at(x, 0.0, 0.16)));
         carcass(office, group);
         for (level, pair) in FLOORS.windows(2).enumerate() {
+            // A bare office has books on its first shelves only.
+            if !office.shows(0.003 * (6 * case + level) as f32) {
+                continue;
+            }
             let pose = Pose::at(0.0, pair[0] + BOARD + GAP, 0.0);
             let shelf = Some(office.scene.group(group, "shelf", pose));
             let height = pair[1] - pair[0] - BOARD - GAP;
@@ -39,11 +46,7 @@ fn carcass(office: &mut Office, parent: Option<usize>) {
         vec3(0.5 * w, height, -0.5 * d),
         ALL_FACES & !X_LOW & !X_HIGH & !Z_LOW,
     );
-    let plinth = cuboid(
-        vec3(-0.5 * w, 0.0, 0.5 * d - 0.04),
-        vec3(0.5 * w, 0.08, 0.5 * d - 0.025),
-        ALL_FACES & !X_LOW & !X_HIGH & !BOTTOM,
-    );
+    let plinth = cuboid(vec3(-0.5 * w, 0.0, 0.5 * d - 0.04), vec3(0.5 * w, 0.08, 0.5 * d - 0.025), Z_LOW | Z_HIGH);
     office.thing(
         parent,
         "bookcase sides",

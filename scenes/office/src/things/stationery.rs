@@ -6,9 +6,7 @@ use glam::{Quat, Vec3, vec3};
 
 use crate::office::{GAP, Office};
 use crate::paint::*;
-use crate::primitives::{
-    ALL_FACES, BOTTOM, bevelled, block, cuboid, curve, cylinder, lathe, loft, sheet, tube,
-};
+use crate::primitives::{ALL_FACES, BOTTOM, block, cuboid, curve, cylinder, lathe, loft, sheet, tube};
 use crate::rng::Rng;
 use crate::scene::Pose;
 use crate::shape::Shape;
@@ -82,7 +80,7 @@ fn thrown_tack(rng: &mut Rng, x: f32, z: f32) -> Pose {
 
 /// A paper clip lying in the xz plane.
 fn clip(office: &mut Office, paint: Paint) -> usize {
-    let (steps, n) = (office.steps(4), office.around(6));
+    let (steps, n) = (office.steps(7), office.around(6));
     let mut path = Vec::new();
     let mut arc = |x: f32, z: f32, r: f32, from: f32| {
         for i in 0..=steps {
@@ -145,9 +143,9 @@ pub fn mug(office: &mut Office, parent: Option<usize>, pose: Pose, paint: Paint)
 
 /// A stapler along x.
 pub fn stapler(office: &mut Office, parent: Option<usize>, pose: Pose) {
-    let base = bevelled(0.15, 0.008, 0.032, 0.002, false);
-    let arm = bevelled(0.14, 0.016, 0.028, 0.004, true).at(Pose::at(-0.004, 0.016, 0.0).roll(0.10).map());
-    let magazine = bevelled(0.135, 0.008, 0.022, 0.001, true).at(Pose::at(-0.002, 0.0085, 0.0).roll(0.04).map());
+    let base = office.bevelled(0.15, 0.008, 0.032, 0.002, false);
+    let arm = office.bevelled(0.14, 0.016, 0.028, 0.004, true).at(Pose::at(-0.004, 0.016, 0.0).roll(0.10).map());
+    let magazine = office.bevelled(0.135, 0.008, 0.022, 0.001, true).at(Pose::at(-0.002, 0.0085, 0.0).roll(0.04).map());
     let hinge = cylinder(0.009, 0.03, office.around(16)).at(Pose::at(-0.066, 0.0185, -0.015).pitch(FRAC_PI_2).map());
     office.thing(parent, "stapler", pose, [(BLACK, base), (TACKS[0], arm), (STEEL, magazine), (DARK_STEEL, hinge)]);
 }
@@ -155,7 +153,7 @@ pub fn stapler(office: &mut Office, parent: Option<usize>, pose: Pose) {
 /// A tape dispenser along x.
 pub fn tape(office: &mut Office, parent: Option<usize>, pose: Pose) {
     let n = office.around(24);
-    let base = bevelled(0.12, 0.018, 0.045, 0.003, false);
+    let base = office.bevelled(0.12, 0.018, 0.045, 0.003, false);
     let cheek = |z: f32| block(0.03, 0.034, 0.004, ALL_FACES & !BOTTOM).moved(-0.02, 0.0181, z);
     let lip = block(0.008, 0.022, 0.024, ALL_FACES & !BOTTOM).moved(0.05, 0.0181, 0.0);
     let ring = [(0.016, -0.009), (0.033, -0.009), (0.033, 0.009), (0.016, 0.009), (0.016, -0.009)];
@@ -195,9 +193,9 @@ pub fn add_desk(office: &mut Office, parent: Option<usize>) {
     let pens: Vec<usize> = [BLACK, TACKS[1], TACKS[0]].iter().map(|&paint| pen(office, paint)).collect();
 
     // Lying pencils fan out side by side; none crosses another.
-    let n = office.count(7).min(14);
+    let n = office.count(7).min(7);
     for i in 0..n {
-        let x = -0.29 - 0.022 * i as f32 + rng.around(0.002);
+        let x = -0.26 - 0.020 * i as f32 + rng.around(0.002);
         let z = 0.30 + rng.around(0.012);
         // Yaw is common with a little play that the spacing allows.
         let yaw = 0.22 + rng.around(0.035);
@@ -225,7 +223,7 @@ pub fn add_desk(office: &mut Office, parent: Option<usize>) {
     }
     // Tacks: a box full and some spilt beside it, each in its own cell so that none meet.
     let meshes = tacks(office);
-    let box_at = (-0.60, 0.02);
+    let box_at = (-0.52, -0.07);
     let mut rng = office.rng("tacks on the desk");
     office.thing(parent, "tack box", Pose::at(box_at.0, 0.0, box_at.1), [(PUTTY, tray(0.075, 0.016, 0.055, 0.0015))]);
     for i in 0..office.count(15).min(15) {
@@ -239,22 +237,22 @@ pub fn add_desk(office: &mut Office, parent: Option<usize>) {
     });
     // Clips.
     let clips = [clip(office, STEEL), clip(office, TACKS[1]), clip(office, TACKS[3])];
-    scatter(office, parent, "paper clips", (-0.66, -0.12), (0.036, 5), 18, &mut |rng, x, z| {
+    scatter(office, parent, "paper clips", (-0.66, -0.08), (0.036, 5), 18, &mut |rng, x, z| {
         (clips[rng.below(3)], Pose::at(x, GAP, z).yaw(rng.range(0.0, TAU)))
     });
     if office.shows(0.05) {
         mug(office, parent, Pose::at(0.42, 0.0, -0.10).yaw(-0.7), GLAZE);
         paper_stack(office, parent, "desk papers", Pose::at(-0.745, 0.0, 0.22).yaw(0.08), office.count(24).min(300));
-        stapler(office, parent, Pose::at(-0.14, 0.0, 0.33).yaw(0.5));
+        stapler(office, parent, Pose::at(0.70, 0.0, 0.26).yaw(0.5));
     }
     if office.shows(0.1) {
         sharpener(office, parent, Pose::at(-0.22, 0.0, 0.09).yaw(0.6));
-        let note = bevelled(0.076, 0.009, 0.076, 0.0001, false);
-        office.thing(parent, "sticky notes", Pose::at(-0.21, 0.0, 0.20).yaw(0.2), [(PAPER_YELLOW_BLOCK, note)]);
-        let eraser = bevelled(0.045, 0.012, 0.02, 0.003, true);
-        office.thing(parent, "eraser", Pose::at(-0.47, 0.0, 0.015).yaw(0.9), [(ERASER, eraser)]);
+        let note = office.bevelled(0.076, 0.009, 0.076, 0.0001, false);
+        office.thing(parent, "sticky notes", Pose::at(-0.205, 0.0, 0.335).yaw(0.2), [(PAPER_YELLOW_BLOCK, note)]);
+        let eraser = office.bevelled(0.045, 0.012, 0.02, 0.003, true);
+        office.thing(parent, "eraser", Pose::at(-0.30, 0.0, 0.06).yaw(0.9), [(ERASER, eraser)]);
         let ruler = cuboid(vec3(-0.15, 0.0, -0.015), vec3(0.15, 0.0022, 0.015), ALL_FACES);
-        office.thing(parent, "ruler", Pose::at(-0.60, 0.0, -0.33).yaw(0.05), [(BARE_WOOD, ruler)]);
+        office.thing(parent, "ruler", Pose::at(-0.42, 0.0, -0.33).yaw(0.05), [(BARE_WOOD, ruler)]);
     }
 }
 
@@ -262,7 +260,7 @@ pub fn add_desk(office: &mut Office, parent: Option<usize>) {
 const PAPER_YELLOW_BLOCK: Paint = solid("sticky notes", 0.80, 0.70, 0.22);
 
 fn sharpener(office: &mut Office, parent: Option<usize>, pose: Pose) {
-    let body = bevelled(0.025, 0.011, 0.015, 0.0015, true);
+    let body = office.bevelled(0.025, 0.011, 0.015, 0.0015, true);
     let blade = block(0.020, 0.0006, 0.008, ALL_FACES).moved(0.001, 0.0112, 0.0);
     office.thing(parent, "sharpener", pose, [(BRASS, body), (STEEL, blade)]);
 }

@@ -2,17 +2,16 @@
 
 use glam::vec3;
 
+use super::rug::ON_RUG;
 use super::{books, calculator, stationery};
 use crate::office::{GAP, Office};
 use crate::paint::{BEECH, CARDBOARD, DARK_STEEL, PORCELAIN, SKIRTING};
-use crate::primitives::{ALL_FACES, BOTTOM, TOP, bevelled, block, cuboid, cylinder};
+use crate::primitives::{ALL_FACES, BOTTOM, TOP, X_HIGH, X_LOW, block, cuboid, cylinder};
 use crate::scene::Pose;
 use crate::shape::Shape;
 
 /// Height of the table's top, metres.
 const HEIGHT: f32 = 0.73;
-/// The rug underneath carries it.
-const ON_RUG: f32 = 0.012;
 
 /// Adds the table and a cardboard box on the floor.
 pub fn add(office: &mut Office) {
@@ -21,7 +20,7 @@ pub fn add(office: &mut Office) {
     }
     let table = Some(office.scene.group(None, "table", Pose::at(3.72, 0.0, 1.92).yaw(0.03)));
     let n = office.around(18);
-    let top = bevelled(1.40, 0.025, 0.78, 0.004, true).moved(0.0, HEIGHT - 0.025, 0.0);
+    let top = office.bevelled(1.40, 0.025, 0.78, 0.004, true).moved(0.0, HEIGHT - 0.025, 0.0);
     let mut parts = vec![(BEECH, top)];
     for (x, z) in [(-0.62, -0.31), (0.62, -0.31), (-0.62, 0.31), (0.62, 0.31)] {
         parts.push((DARK_STEEL, cylinder(0.022, HEIGHT - 0.025 - ON_RUG - 2.0 * GAP, n).moved(x, ON_RUG + GAP, z)));
@@ -62,11 +61,11 @@ fn floppies(office: &mut Office, parent: Option<usize>, pose: Pose) {
     let group = Some(office.scene.group(parent, "floppy box", pose));
     let (w, h, d, t) = (0.10, 0.06, 0.16, 0.002);
     let walls = [
-        block(w, t, d, ALL_FACES & !BOTTOM),
-        block(w, h, t, ALL_FACES & !BOTTOM).moved(0.0, 0.0, 0.5 * (d + t)),
-        block(w, h, t, ALL_FACES & !BOTTOM).moved(0.0, 0.0, -0.5 * (d + t)),
-        block(t, h, d, ALL_FACES & !BOTTOM).moved(0.5 * (w + t), 0.0, 0.0),
-        block(t, h, d, ALL_FACES & !BOTTOM).moved(-0.5 * (w + t), 0.0, 0.0),
+        block(w, t, d, TOP),
+        block(w + 2.0 * t, h, t, ALL_FACES & !BOTTOM).moved(0.0, 0.0, 0.5 * (d + t)),
+        block(w + 2.0 * t, h, t, ALL_FACES & !BOTTOM).moved(0.0, 0.0, -0.5 * (d + t)),
+        block(t, h, d, TOP | X_LOW | X_HIGH).moved(0.5 * (w + t), 0.0, 0.0),
+        block(t, h, d, TOP | X_LOW | X_HIGH).moved(-0.5 * (w + t), 0.0, 0.0),
     ];
     office.thing(group, "floppy case", Pose::at(0.0, 0.0, 0.0), [(SKIRTING, Shape::of(walls))]);
     let colours = [crate::paint::BLACK, crate::paint::COVERS[7], crate::paint::COVERS[6], crate::paint::PUTTY];
@@ -97,7 +96,9 @@ fn floppies(office: &mut Office, parent: Option<usize>, pose: Pose) {
 fn carton(office: &mut Office) {
     let group = Some(office.scene.group(None, "carton", Pose::at(5.45, 0.0, 1.08).yaw(0.2)));
     let (w, h, d, t) = (0.42, 0.32, 0.32, 0.004);
-    let wall = |w: f32, d: f32, x: f32, z: f32| block(w, h, d, ALL_FACES & !BOTTOM).moved(x, 0.0, z);
+    let wall = |w: f32, d: f32, x: f32, z: f32| {
+        block(w, h, d, if x == 0.0 { ALL_FACES & !BOTTOM } else { TOP | X_LOW | X_HIGH }).moved(x, 0.0, z)
+    };
     let walls = Shape::of([
         block(w, t, d, TOP),
         wall(w + 2.0 * t, t, 0.0, 0.5 * (d + t)),

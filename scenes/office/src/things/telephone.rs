@@ -4,7 +4,7 @@ use glam::vec3;
 
 use crate::office::{GAP, Office};
 use crate::paint::{BLACK, DARK_STEEL, PAPER};
-use crate::primitives::{bevelled, curve, cylinder, loft, rounded_rectangle, tube};
+use crate::primitives::{curve, cylinder, loft, rounded_rectangle, tube};
 use crate::scene::Pose;
 
 /// Adds a telephone; its keys face +z and up.
@@ -21,14 +21,14 @@ pub fn add(office: &mut Office, parent: Option<usize>, pose: Pose) {
     office.thing(phone, "telephone body", Pose::at(0.0, 0.0, 0.0), [(DARK_STEEL, body)]);
     let slope = 0.16_f32.atan();
     let face = office.scene.group(phone, "telephone face", Pose::at(0.0, 0.026 + 0.16 * 0.11 + GAP, 0.0).pitch(slope));
-    let key = office.mesh("telephone key", [(PAPER_KEY, bevelled(0.013, 0.004, 0.010, 0.001, false))]);
+    let key = office.mesh("telephone key", [(PAPER_KEY, office.bevelled(0.013, 0.004, 0.010, 0.001, false))]);
     for row in 0..4 {
         for column in 0..3 {
             let at = Pose::at(0.015 + 0.02 * column as f32, 0.0, 0.0 + 0.019 * row as f32);
             office.scene.place(Some(face), "telephone key", key, at);
         }
     }
-    let memory = office.mesh("telephone memory key", [(BLACK, bevelled(0.022, 0.003, 0.006, 0.0008, false))]);
+    let memory = office.mesh("telephone memory key", [(BLACK, office.bevelled(0.022, 0.003, 0.006, 0.0008, false))]);
     for i in 0..6 {
         office.scene.place(Some(face), "telephone memory key", memory, Pose::at(0.035, 0.0, -0.09 + 0.011 * i as f32));
     }
@@ -50,8 +50,8 @@ pub fn add(office: &mut Office, parent: Option<usize>, pose: Pose) {
     );
     // The coiled cord from the handset to the front of the base.
     if office.shows(0.1) {
-        let turns = 22;
-        let per = office.steps(8);
+        let turns = 14;
+        let per = office.steps(14);
         let coil: Vec<_> = (0..=turns * per)
             .map(|i| {
                 let t = i as f32 / (turns * per) as f32;
