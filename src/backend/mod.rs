@@ -3,8 +3,12 @@
 //! Two implementations: [`embree`] (production) and [`obvhs`] (pure Rust, validates the first). Queries go in
 //! batches, so that one dynamic call and one crossing of the FFI serve thousands of rays.
 
+pub mod compare;
 pub mod embree;
 pub mod obvhs;
+#[cfg(test)]
+mod tests;
+mod triangle;
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -15,12 +19,15 @@ use crate::error::Result;
 
 /// A ray and the part of it that counts, `t_near <= t <= t_far`, in units of the length of `direction`
 /// (unit length wherever a distance is meant).
+///
+/// Rays with NaN or infinite parts (but for `t_far`), without a direction or with `t_far < t_near` hit nothing.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
     /// Start point, in scene coordinates.
     pub origin: Vec3,
-    /// Smallest parameter at which a hit counts; not negative.
+    /// Smallest parameter at which a hit counts; negative is taken as 0, at which a ray that starts on a triangle
+    /// hits it.
     pub t_near: f32,
     /// Direction.
     pub direction: Vec3,
@@ -32,6 +39,12 @@ impl Ray {
     /// A ray from `origin` to infinity.
     pub fn new(origin: Vec3, direction: Vec3) -> Self {
         Ray { origin, t_near: 0.0, direction, t_far: f32::INFINITY }
+    }
+
+    /// Whether the ray can hit anything at all; see [`Ray`].
+    pub fn is_usable(&self) -> bool {
+        let Ray { origin, t_near, direction, t_far } = *self;
+        origin.is_finite() && direction.is_finite() && direction != Vec3::ZERO && t_near.is_finite() && t_far >= t_near
     }
 
     /// The point at parameter `t`.
@@ -107,6 +120,34 @@ pub struct TriangleSet<'a> {
     pub parts: &'a [Part],
     /// Asked for hits on [`PartKind::Filtered`] parts; without one these are opaque.
     pub filter: Option<Arc<dyn HitFilter>>,
+}
+
+impl TriangleSet<'_> {
+    /// Whether the indices stay within what they index, and the parts hold every triangle exactly once.
+    ///
+    /// # Errors
+    /// What is wrong, in words. It is a mistake of the program, not of its input.
+    pub fn check(&self) -> std::result::Result<(), String> {
+        if self.triangles.len() >= Hit::NONE as usize {
+            return Err(format!("{} triangles are more than an index can count", self.triangles.len()));
+        }
+        let beyond = |index: &u32| *index as usize >= self.positions.len();
+        if let Some(triangle) = self.triangles.iter().position(|corners| corners.iter().any(beyond)) {
+            return Err(format!(
+                "triangle {triangle} has corners {:?}, but there are {} positions",
+                self.triangles[triangle],
+                self.positions.len()
+            ));
+        }
+        let mut ranges: Vec<_> =
+            self.parts.iter().map(|part| &part.triangles).filter(|range| !range.is_empty()).collect();
+        ranges.sort_by_key(|range| range.start);
+        let covered = ranges.iter().try_fold(0, |end, range| (range.start == end).then_some(range.end));
+        if covered.map(|end| end as usize) != Some(self.triangles.len()) {
+            return Err(format!("the parts do not hold each of {} triangles once", self.triangles.len()));
+        }
+        Ok(())
+    }
 }
 
 /// Which parts a batch of rays sees.

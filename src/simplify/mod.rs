@@ -1,18 +1,32 @@
 //! Geometric simplification: surfaces are classified, small ones clustered, clusters replaced by equivalent boxes.
 
+pub mod classify;
+pub mod cluster;
+pub mod dropped;
+pub mod fit;
 pub mod geometry;
+mod replace;
+pub mod surfaces;
+mod support;
+#[cfg(test)]
+mod testing;
+#[cfg(test)]
+mod tests;
+
+use std::sync::Arc;
 
 use glam::{Mat3, Vec3};
 
 pub use geometry::{SimplifiedGeometry, TriangleSource};
 
-use crate::backend::RayBackend;
+use crate::backend::{HitFilter, RayBackend};
 use crate::error::Result;
 use crate::progress::Progress;
 use crate::scene::{Aabb, Scene};
 
 /// How a cluster's box is fitted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, serde::Serialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
 pub enum BoxFit {
     /// Conserves intercepted flux, escape albedo a face patch. The default.
     #[default]
@@ -66,6 +80,13 @@ pub enum Class {
     },
 }
 
+impl Class {
+    /// Whether it is left out of the simplified scene without anything in its place.
+    pub fn is_isolated(self) -> bool {
+        self == Class::Complex { cluster: None }
+    }
+}
+
 /// A group of small surfaces and the box that replaces it.
 #[derive(Clone, Debug)]
 pub struct Cluster {
@@ -97,6 +118,16 @@ pub struct EquivalentBox {
     pub resolution: u32,
     /// Reflectances of `resolution^2` patches for each face.
     pub reflectance: [Vec<Vec3>; 6],
+}
+
+impl EquivalentBox {
+    /// Axis-aligned bounds, world space.
+    pub fn bounds(&self) -> Aabb {
+        let reach = self.axes.x_axis.abs() * self.half.x
+            + self.axes.y_axis.abs() * self.half.y
+            + self.axes.z_axis.abs() * self.half.z;
+        Aabb { min: self.centre - reach, max: self.centre + reach }
+    }
 }
 
 /// Cluster against box, on rays that were not used to fit it.
@@ -136,13 +167,99 @@ pub struct Simplified {
 /// Classifies, clusters and fits boxes.
 ///
 /// # Errors
-/// When a backend fails to build a cluster's scene.
+/// [`Error::Usage`](crate::error::Error::Usage) for parameters that make no sense;
+/// [`Error::Backend`](crate::error::Error::Backend) when the backend fails.
 pub fn simplify(
     scene: &Scene,
     backend: &dyn RayBackend,
     params: &SimplifyParams,
     progress: &Progress,
 ) -> Result<Simplified> {
-    let _ = (scene, backend, params, progress);
-    todo!("simplify helper")
+    let a_thresh = classify::check(params)?;
+    let map = surfaces::find_surfaces(&scene.mesh, params.crease_angle);
+    let mut warnings = Vec::new();
+
+    let mut surfaces = map.surfaces.clone();
+    let mut groups = Vec::new();
+    if is_used(scene, params.r_thresh) {
+        let limit = classify::size_limit(scene, params.r_thresh);
+        let small = classify::find_small(scene, &surfaces, a_thresh, limit);
+        groups = cluster::find_clusters(&scene.mesh, &map, &small.compact, limit);
+        let kept_long = drop_isolated(&mut surfaces, &mut groups, &small, a_thresh, params.r_thresh);
+        if kept_long > 0 {
+            warnings.push(format!(
+                "{kept_long} surfaces have less area than A_thresh = {a_thresh:.3e} but are longer than {limit:.3e} and stay normal"
+            ));
+        }
+        for (cluster, group) in (0u32..).zip(&groups) {
+            for &s in &group.surfaces {
+                surfaces[s as usize].class = Class::Complex { cluster: Some(cluster) };
+            }
+        }
+    }
+
+    let mut geometry = SimplifiedGeometry::normal(scene, &surfaces, &map.of_triangle);
+    let replaced = replace::replace(scene, backend, params, &groups, &map.of_triangle, &geometry, progress)?;
+    warnings.extend(replaced.warnings);
+    geometry.add_boxes(&replaced.clusters);
+    Ok(Simplified {
+        params: params.clone(),
+        a_thresh,
+        surfaces,
+        surface_of_triangle: map.of_triangle,
+        clusters: replaced.clusters,
+        geometry,
+        rays: replaced.rays,
+        warnings,
+    })
+}
+
+/// Whether any ray can be long enough to meet the simplified scene. The distance of the lookup may be drawn from
+/// `r_thresh / 2` upwards, hence the factor. Otherwise (as for `r_thresh` = infinity) nothing needs to be simplified.
+fn is_used(scene: &Scene, r_thresh: f32) -> bool {
+    r_thresh > 0.0 && r_thresh <= 2.0 * scene.mesh.bounds.diagonal()
+}
+
+/// Takes the groups that are dropped out of `groups` and marks their surfaces. Returns how many surfaces had to stay normal
+/// because they are too long for a cluster.
+fn drop_isolated(
+    surfaces: &mut [Surface],
+    groups: &mut Vec<cluster::Group>,
+    small: &classify::Small,
+    a_thresh: f64,
+    r_thresh: f32,
+) -> usize {
+    let of_group = |g: &cluster::Group| dropped::Candidate { centre: g.bounds.centre(), area: g.visible_area() };
+    let of_surface = |&s: &u32| {
+        let surface: &Surface = &surfaces[s as usize];
+        dropped::Candidate { centre: surface.bounds.centre(), area: surface.area }
+    };
+    let candidates: Vec<_> =
+        groups.iter().map(of_group).chain(small.long_isolated.iter().map(of_surface)).collect();
+    let is_dropped = dropped::choose_dropped(&candidates, a_thresh, r_thresh);
+    let (of_groups, of_long) = is_dropped.split_at(groups.len());
+    let gone = Class::Complex { cluster: None };
+    let mut kept = small.long_kept;
+    for (&s, &dropped) in small.long_isolated.iter().zip(of_long) {
+        if dropped {
+            surfaces[s as usize].class = gone;
+        } else {
+            kept += 1;
+        }
+    }
+    let mut of_groups = of_groups.iter();
+    groups.retain(|group| {
+        let dropped = of_groups.next().copied().unwrap_or(false);
+        if dropped {
+            group.surfaces.iter().for_each(|&s| surfaces[s as usize].class = gone);
+        }
+        !dropped
+    });
+    kept
+}
+
+/// The scene's filter for alpha-tested triangles, where it has any.
+pub(crate) fn scene_filter(scene: &Scene) -> Option<Arc<dyn HitFilter>> {
+    let _ = scene;
+    None
 }

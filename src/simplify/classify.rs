@@ -1,0 +1,109 @@
+//! Which surfaces are small enough to be simplified.
+
+use std::f64::consts::PI;
+
+use rayon::prelude::*;
+
+use super::{SimplifyParams, Surface};
+use crate::backend::PartKind;
+use crate::error::{Error, Result};
+use crate::scene::{Material, Scene};
+
+/// Perceptual roughness under which a metal counts as a mirror. A mirror shows its surroundings, which no diffuse box does.
+const MIRROR_ROUGHNESS: f32 = 0.25;
+
+/// Metalness from which the specular lobe carries most of the reflectance.
+const MIRROR_METALLIC: f32 = 0.5;
+
+/// Surfaces and clusters larger than this share of the scene's diagonal are no detail, whatever `r_thresh` says: they
+/// enclose. Without this bound a large `r_thresh` would turn the walls of a room into clutter.
+const ENCLOSING_SHARE: f32 = 0.25;
+
+/// `A_thresh = 2 pi beta r_thresh^2` (Eq. 6), in squared scene units.
+pub fn area_threshold(r_thresh: f32, beta: f32) -> f64 {
+    2.0 * PI * f64::from(beta) * f64::from(r_thresh) * f64::from(r_thresh)
+}
+
+/// Refuses parameters that make no sense; gives `A_thresh`.
+///
+/// # Errors
+/// [`Error::Usage`], naming the parameter.
+pub fn check(params: &SimplifyParams) -> Result<f64> {
+    let refuse = |what: &str, value: f32, why: &str| Err(Error::Usage(format!("{what} = {value}: {why}")));
+    if params.r_thresh.is_nan() || params.r_thresh < 0.0 {
+        return refuse("r_thresh", params.r_thresh, "must be a length, 0 or more (infinity is allowed)");
+    }
+    if !(0.0..=1.0).contains(&params.beta) {
+        return refuse("beta", params.beta, "must lie between 0 and 1");
+    }
+    if !(0.0..=std::f32::consts::PI).contains(&params.crease_angle) {
+        return refuse("crease angle", params.crease_angle, "must lie between 0 and pi radians");
+    }
+    if params.face_resolution == 0 {
+        return Err(Error::Usage("face resolution = 0: a box face needs at least one patch".into()));
+    }
+    let a_thresh = area_threshold(params.r_thresh, params.beta);
+    if a_thresh.is_nan() {
+        return Err(Error::Usage(
+            "r_thresh = infinity with beta = 0: A_thresh = 2 pi beta r_thresh^2 has no value; use a beta above 0 or a finite r_thresh"
+                .into(),
+        ));
+    }
+    Ok(a_thresh)
+}
+
+/// The largest diagonal of a surface or cluster that may be simplified: a point inside a cluster wider than `r_thresh` would
+/// see nothing between `r_thresh` and the wall of its box.
+pub fn size_limit(scene: &Scene, r_thresh: f32) -> f32 {
+    r_thresh.min(ENCLOSING_SHARE * scene.mesh.bounds.diagonal())
+}
+
+/// Small surfaces by what can be done with them.
+#[derive(Debug, Default)]
+pub struct Small {
+    /// Small in area and in extent: may be clustered or dropped.
+    pub compact: Vec<u32>,
+    /// Small in area, too long for a cluster, nothing near them: may be dropped.
+    pub long_isolated: Vec<u32>,
+    /// Small in area, too long for a cluster, not alone: stay normal.
+    pub long_kept: usize,
+}
+
+/// Finds the small surfaces: area strictly below `a_thresh`, and no light source, mirror or glass.
+pub fn find_small(scene: &Scene, surfaces: &[Surface], a_thresh: f64, limit: f32) -> Small {
+    let mut small = Small::default();
+    let mut long = Vec::new();
+    for (i, surface) in (0u32..).zip(surfaces) {
+        let object = &scene.mesh.objects[surface.object as usize];
+        let material = &scene.materials[object.material as usize];
+        if surface.area < a_thresh && object.kind != PartKind::Pane && can_be_simplified(material) {
+            if surface.bounds.diagonal() <= limit { &mut small.compact } else { &mut long }.push(i);
+        }
+    }
+    // Anything that touches another surface may be part of an enclosure (GSII-025: the walls of a room whose area is below
+    // A_thresh), and without it light would leak.
+    let mut by_area: Vec<u32> = (0..surfaces.len() as u32).collect();
+    by_area.sort_by(|&a, &b| surfaces[b as usize].area.total_cmp(&surfaces[a as usize].area));
+    let gap = neighbour_gap(limit);
+    small.long_isolated = long
+        .par_iter()
+        .copied()
+        .filter(|&i| {
+            let bounds = surfaces[i as usize].bounds.expanded(gap);
+            !by_area.iter().any(|&j| j != i && surfaces[j as usize].bounds.overlaps(&bounds))
+        })
+        .collect();
+    small.long_kept = long.len() - small.long_isolated.len();
+    small
+}
+
+/// Small surfaces closer than this belong together.
+pub fn neighbour_gap(limit: f32) -> f32 {
+    0.25 * limit
+}
+
+/// Light sources would be swallowed by a box, mirrors and glass are nothing like one.
+fn can_be_simplified(material: &Material) -> bool {
+    let mirror = material.metallic >= MIRROR_METALLIC && material.roughness < MIRROR_ROUGHNESS;
+    !material.is_emitter() && !mirror && material.transmission == 0.0
+}

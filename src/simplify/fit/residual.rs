@@ -1,0 +1,25 @@
+//! How well a box stands for its cluster, on lines that were not used to fit it.
+
+use glam::Vec3;
+
+use super::flux::{LineTally, mean_reflectance};
+use super::half_surface;
+use crate::simplify::FitResidual;
+
+impl FitResidual {
+    /// Compares a box with edges `edges` to what `fresh` lines tell about the cluster in a bounding box with edges `size`.
+    ///
+    /// The share of uniform lines that a convex box inside the bounding box intercepts is the ratio of their surfaces, exactly,
+    /// so only the cluster is sampled.
+    pub(crate) fn new(size: Vec3, edges: Vec3, reflectance: &[Vec<Vec3>; 6], fresh: &LineTally) -> Self {
+        let of_box = half_surface(edges) / half_surface(size);
+        let of_cluster = fresh.hit_share();
+        let ratio = of_box / of_cluster;
+        FitResidual {
+            hit_share: of_cluster as f32,
+            intercepted: (ratio - 1.0) as f32,
+            intercepted_error: (ratio * fresh.relative_error()) as f32,
+            reflected: mean_reflectance(reflectance, edges) - fresh.albedo(),
+        }
+    }
+}
