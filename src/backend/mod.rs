@@ -5,6 +5,8 @@
 
 pub mod embree;
 pub mod obvhs;
+#[cfg(test)]
+mod tests;
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -107,6 +109,34 @@ pub struct TriangleSet<'a> {
     pub parts: &'a [Part],
     /// Asked for hits on [`PartKind::Filtered`] parts; without one these are opaque.
     pub filter: Option<Arc<dyn HitFilter>>,
+}
+
+impl TriangleSet<'_> {
+    /// Whether the indices stay within what they index, and the parts hold every triangle exactly once.
+    ///
+    /// # Errors
+    /// What is wrong, in words. It is a mistake of the program, not of its input.
+    pub fn check(&self) -> std::result::Result<(), String> {
+        if self.triangles.len() >= Hit::NONE as usize {
+            return Err(format!("{} triangles are more than an index can count", self.triangles.len()));
+        }
+        let beyond = |index: &u32| *index as usize >= self.positions.len();
+        if let Some(triangle) = self.triangles.iter().position(|corners| corners.iter().any(beyond)) {
+            return Err(format!(
+                "triangle {triangle} has corners {:?}, but there are {} positions",
+                self.triangles[triangle],
+                self.positions.len()
+            ));
+        }
+        let mut ranges: Vec<_> =
+            self.parts.iter().map(|part| &part.triangles).filter(|range| !range.is_empty()).collect();
+        ranges.sort_by_key(|range| range.start);
+        let covered = ranges.iter().try_fold(0, |end, range| (range.start == end).then_some(range.end));
+        if covered.map(|end| end as usize) != Some(self.triangles.len()) {
+            return Err(format!("the parts do not hold each of {} triangles once", self.triangles.len()));
+        }
+        Ok(())
+    }
 }
 
 /// Which parts a batch of rays sees.
