@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::RadiosityScene;
 use super::patches::Patches;
+use super::shoot::side_normal;
 use crate::backend::Ray;
 use crate::lighting::shadow;
 use crate::sampling;
@@ -111,14 +112,15 @@ fn sample(input: &RadiosityScene<'_>, patches: &Patches, side: u32, index: u32, 
     let stream = sampling::hash_all(&[stream, side]);
     let s = sampling::sobol(index, 0, stream);
     let choice = sampling::sobol(index, 1, stream)[0];
-    let point = patches.sample_side(input.geometry, side, [s[0], s[1]]);
-    let light = input.lights.sample(input.scene, point.position, point.normal, [choice, s[2], s[3]])?;
-    let cos = light.direction.dot(point.normal);
+    let point = patches.point(input.geometry, side / 2, [s[0], s[1]]);
+    let normal = side_normal(&point, side);
+    let light = input.lights.sample(input.scene, point.position, normal, [choice, s[2], s[3]])?;
+    let cos = light.direction.dot(normal);
     if cos <= 0.0 || light.weight.max_element() <= 0.0 {
         return None;
     }
     let ray = Ray {
-        origin: point.ray_origin(),
+        origin: point.ray_origin(light.direction),
         t_near: 0.0,
         direction: light.direction,
         t_far: light.distance * SHORTEN,

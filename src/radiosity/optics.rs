@@ -1,6 +1,6 @@
 //! What patches reflect and emit.
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::RadiosityScene;
@@ -12,8 +12,8 @@ use crate::scene::{Material, Scene};
 use crate::shading::{Bsdf, SurfacePoint};
 use crate::simplify::TriangleSource;
 
-/// Roughness under which the scattering function sets lobes apart. Only delta lobes are followed here, the rest is
-/// reflected diffusely, so the smallest does.
+/// Roughness under which lobes count as highly directional. With the smallest, only mirrors and glass are followed, and
+/// glossy reflection is part of the diffuse reflectance.
 pub(super) const GLOSSY_THRESHOLD: f32 = 0.0;
 
 /// Points at which a material that varies over a patch is looked at.
@@ -23,12 +23,14 @@ const SLACK: f32 = 1e-5;
 
 /// Reflectance and emission of patches.
 pub(super) struct Optics {
-    /// Diffuse reflectance of each patch, 0..=1: everything but mirror-like reflection and transmission.
+    /// Diffuse reflectance of each patch, 0..=1: everything but mirror-like reflection, and transmission.
     pub reflectance: Vec<Vec3>,
     /// Sides that emit and their exitance in W/m^2, in ascending order.
     pub emission: Vec<(u32, DVec3)>,
-    /// Whether each material may reflect or transmit like a mirror or clear glass.
-    specular: Vec<bool>,
+    /// Whether a patch also reflects like a mirror or transmits.
+    pub specular: Vec<bool>,
+    /// Whether any does.
+    pub any_specular: bool,
 }
 
 impl Optics {
@@ -37,14 +39,14 @@ impl Optics {
     /// # Errors
     /// [`Error::Unsolvable`] when a surface reflects more than it receives, or less than nothing.
     pub fn new(input: &RadiosityScene<'_>, patches: &Patches) -> Result<Optics> {
-        let average: Vec<(Vec3, Vec3)> =
-            (0..patches.len() as u32).into_par_iter().map(|p| average(input, patches, p)).collect();
+        let means: Vec<Mean> = (0..patches.len() as u32).into_par_iter().map(|p| mean(input, patches, p)).collect();
         let mut optics = Optics {
-            reflectance: Vec::with_capacity(average.len()),
+            reflectance: Vec::with_capacity(means.len()),
             emission: Vec::new(),
-            specular: input.scene.materials.iter().map(|m| !m.is_lambertian()).collect(),
+            specular: means.iter().map(|m| m.specular).collect(),
+            any_specular: means.iter().any(|m| m.specular),
         };
-        for (patch, (reflectance, radiance)) in (0..).zip(average) {
+        for (patch, Mean { reflectance, radiance, .. }) in (0..).zip(means) {
             let ok = |x: f32| (0.0..=1.0 + SLACK).contains(&x); // false for NaN
             if !reflectance.to_array().into_iter().all(ok) {
                 return Err(Error::Unsolvable(format!(
@@ -64,16 +66,6 @@ impl Optics {
             }
         }
         Ok(optics)
-    }
-
-    /// Whether photons may have to be followed beyond their first hit at all.
-    pub fn any_specular(&self) -> bool {
-        self.specular.contains(&true)
-    }
-
-    /// Whether `material` may reflect or transmit without scattering.
-    pub fn is_specular(&self, material: u32) -> bool {
-        self.specular[material as usize]
     }
 }
 
@@ -95,46 +87,45 @@ fn owner(input: &RadiosityScene<'_>, patches: &Patches, patch: u32) -> String {
     }
 }
 
-/// Mean diffuse reflectance and mean emitted radiance of a patch.
-fn average(input: &RadiosityScene<'_>, patches: &Patches, patch: u32) -> (Vec3, Vec3) {
+/// Means over a patch.
+#[derive(Clone, Copy, Default)]
+struct Mean {
+    reflectance: Vec3,
+    radiance: Vec3,
+    specular: bool,
+}
+
+fn mean(input: &RadiosityScene<'_>, patches: &Patches, patch: u32) -> Mean {
     if let Some(cell) = patches.box_cell[patch as usize] {
         let equivalent = &input.clusters[cell.cluster as usize].equivalent_box;
-        return (equivalent.reflectance[usize::from(cell.face)][cell.index as usize], Vec3::ZERO);
+        let reflectance = equivalent.reflectance[usize::from(cell.face)][cell.index as usize];
+        return Mean { reflectance, ..Mean::default() };
     }
     let TriangleSource::Scene { triangle } = source(input, patches, patch) else {
-        return (Vec3::ZERO, Vec3::ZERO); // boxes were dealt with
+        return Mean::default(); // boxes were dealt with
     };
     let scene = input.scene;
     let look = material(scene, triangle);
     let varies =
         look.base_color_texture.is_some() || look.emission_texture.is_some() || !scene.mesh.colors.is_empty();
     if look.is_lambertian() && !varies {
-        return (look.base_color, look.emission);
+        return Mean { reflectance: look.base_color, radiance: look.emission, specular: false };
     }
-    let (mut reflectance, mut radiance) = (DVec3::ZERO, DVec3::ZERO);
+    let (mut reflectance, mut radiance, mut specular) = (DVec3::ZERO, DVec3::ZERO, false);
     for i in 0..POINTS {
         let s = sampling::sobol(i, 0, patch);
         let (on, uv) = patches.sample(patch, [s[0], s[1]]);
         let TriangleSource::Scene { triangle } = input.geometry.sources[on as usize] else { continue };
         let point = SurfacePoint::new(scene, &Hit { t: 0.0, u: uv.x, v: uv.y, triangle });
-        let toward = sampling::cosine_hemisphere(glam::Vec2::new(s[2], s[3]));
-        // Light arrives on both sides of a surface; its back reflects like its front.
-        let bsdf = Bsdf::new(scene, &point, sampling::basis(point.shading_normal) * toward, GLOSSY_THRESHOLD);
-        reflectance += diffuse_albedo(&bsdf, i).as_dvec3();
-        radiance += bsdf.emission().as_dvec3();
+        // Directions like those of the reflected light that is wanted. The back reflects like the front.
+        let toward = sampling::basis(point.shading_normal) * sampling::cosine_hemisphere(Vec2::new(s[2], s[3]));
+        let bsdf = Bsdf::new(scene, &point, toward, GLOSSY_THRESHOLD);
+        reflectance += bsdf.albedo_low().as_dvec3();
+        specular |= bsdf.albedo_high() != Vec3::ZERO;
+        if look.is_emitter() {
+            radiance += scene.emission(triangle, uv.x, uv.y).as_dvec3();
+        }
     }
     let n = f64::from(POINTS);
-    ((reflectance / n).as_vec3(), (radiance / n).as_vec3())
-}
-
-/// Directional-hemispherical albedo of everything that scatters.
-fn diffuse_albedo(bsdf: &Bsdf, index: u32) -> Vec3 {
-    if let Some(reflectance) = bsdf.lambertian() {
-        return reflectance;
-    }
-    let s = sampling::sobol(index, 1, 0);
-    match bsdf.sample_high([s[0], s[1], s[2]]) {
-        Some(sample) if sample.pdf.is_some() => bsdf.albedo_low() + bsdf.albedo_high(),
-        _ => bsdf.albedo_low(),
-    }
+    Mean { reflectance: (reflectance / n).as_vec3(), radiance: (radiance / n).as_vec3(), specular }
 }

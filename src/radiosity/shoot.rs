@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::RadiosityScene;
 use super::ledger::Tally;
-use super::optics::Optics;
+use super::optics::{GLOSSY_THRESHOLD, Optics};
 use super::patches::Patches;
 use crate::backend::{Coherence, Hit, Ray, Visible};
 use crate::sampling;
@@ -102,6 +102,11 @@ struct Output {
     tally: Tally,
 }
 
+/// Unit geometric normal of `side` at a point of its patch.
+pub(super) fn side_normal(point: &SurfacePoint, side: u32) -> Vec3 {
+    if side.is_multiple_of(2) { point.geometric_normal } else { -point.geometric_normal }
+}
+
 impl Tracer<'_> {
     /// Shoots `shots` and adds the flux that arrives to `incident`, one entry a side.
     pub fn shoot(&self, shots: &[Shot], incident: &mut [DVec3]) -> Tally {
@@ -121,11 +126,11 @@ impl Tracer<'_> {
                 let shot = &shots[at];
                 let index = u64::from(shot.rays) - (ends[at] - k);
                 let s = sampling::sobol(index as u32, 0, shot.stream);
-                let point = self.patches.sample_side(geometry, shot.side, [s[0], s[1]]);
+                let point = self.patches.point(geometry, shot.side / 2, [s[0], s[1]]);
                 let local = sampling::cosine_hemisphere(Vec2::new(s[2], s[3]));
-                let direction = sampling::basis(point.normal) * local;
+                let direction = sampling::basis(side_normal(&point, shot.side)) * local;
                 let id = u64::from(shot.stream) << 32 | index;
-                photons.push(Ray::new(point.ray_origin(), direction), Load { flux: shot.flux, id, bent: false });
+                photons.push(Ray::new(point.ray_origin(direction), direction), Load { flux: shot.flux, id, bent: false });
             }
         };
         self.trace(total, &emit, Deposit::All, incident)
@@ -164,7 +169,6 @@ impl Tracer<'_> {
     fn follow(&self, scratch: &mut Scratch, deposit: Deposit) -> Output {
         let Scratch { photons, next, hits } = scratch;
         let mut output = Output { deposits: Vec::with_capacity(photons.rays.len()), tally: Tally::default() };
-        let specular = self.optics.any_specular();
         for depth in 0..MAX_CHAIN {
             if photons.rays.is_empty() {
                 return output;
@@ -181,12 +185,12 @@ impl Tracer<'_> {
                     }
                     continue;
                 }
-                let patch = self.patches.at(hit.triangle, hit.u, hit.v);
+                let patch = self.patches.map.at(hit.triangle, hit.u, hit.v);
                 if counts {
                     let front = ray.direction.dot(self.patches.normals[hit.triangle as usize]) < 0.0;
                     output.deposits.push((2 * patch + u32::from(!front), load.flux));
                 }
-                if specular
+                if self.optics.specular[patch as usize]
                     && let Some((ray, load)) = self.pass_on(patch, hit, ray.direction, load, depth as u32)
                 {
                     if deposit == Deposit::All || load.bent {
@@ -208,21 +212,24 @@ impl Tracer<'_> {
             return None;
         };
         let scene = self.input.scene;
-        if !self.optics.is_specular(scene.mesh.object(triangle).material) {
-            return None;
-        }
         let point = SurfacePoint::new(scene, &Hit { triangle, ..*hit });
-        let bsdf = Bsdf::new(scene, &point, -direction, super::optics::GLOSSY_THRESHOLD);
+        let bsdf = Bsdf::new(scene, &point, -direction, GLOSSY_THRESHOLD);
         let mut key = sampling::hash_all(&[load.id as u32, (load.id >> 32) as u32, depth]);
         let mut random = || {
             key = sampling::hash(key.wrapping_add(0x9e37_79b9));
             sampling::unit(key)
         };
         let sample = bsdf.sample_high([random(), random(), random()])?;
-        if sample.pdf.is_some() {
-            return None; // part of the diffuse reflectance, see `Optics`
+        let material = &scene.materials[scene.mesh.object(triangle).material as usize];
+        let mut weight = sample.weight;
+        if sample.transmitted && !sample.straight && material.refracts {
+            // Flux, unlike radiance, does not change with the index of refraction (pbrt 4ed 9.5.2).
+            let squared = material.ior.max(1.0).powi(2);
+            let front = direction.dot(point.geometric_normal) < 0.0;
+            weight *= if front { squared } else { 1.0 / squared };
         }
-        let weight = sample.weight.min(Vec3::ONE - self.optics.reflectance[patch as usize]).max(Vec3::ZERO);
+        // What the patch takes for diffuse reflection cannot go on as well.
+        let weight = weight.min(Vec3::ONE - self.optics.reflectance[patch as usize]).max(Vec3::ZERO);
         let survival = (weight.max_element() / ROULETTE).min(1.0);
         if random() >= survival {
             return None;

@@ -81,6 +81,22 @@ impl SurfacePoint {
         point
     }
 
+    /// The point at `u`, `v` of a triangle with the given corners, which need not belong to a scene: flat, without texture
+    /// coordinates. `triangle` is only stored.
+    pub fn flat(corners: [Vec3; 3], triangle: u32, u: f32, v: f32) -> Self {
+        let (position, error, normal) = locate(corners, u, v);
+        SurfacePoint {
+            position,
+            error,
+            geometric_normal: normal,
+            shading_normal: normal,
+            uv: [Vec2::ZERO; 2],
+            triangle,
+            u,
+            v,
+        }
+    }
+
     /// Origin for a ray that leaves into `direction`: moved along the geometric normal to the side of `direction`
     /// by the error bound, and rounded away from the surface (pbrt 4ed 6.8.6).
     pub fn ray_origin(&self, direction: Vec3) -> Vec3 {

@@ -138,7 +138,7 @@ fn neighbours(edges: &[Edge], triangles: usize) -> Vec<[u32; 6]> {
 /// Aligns the axes of each chart with its outline: the mean direction modulo a right angle of all boundary edges, weighted by
 /// length. Exact for rectangles, and the same however finely the outline is divided.
 fn frames(geometry: &SimplifiedGeometry, edges: &[Edge], of_triangle: &[u32], normals: &[DVec3]) -> Vec<Frame> {
-    let planes: Vec<(DVec3, DVec3)> = normals.iter().map(DVec3::any_orthonormal_pair).collect();
+    let planes: Vec<(DVec3, DVec3)> = normals.iter().map(|n| n.any_orthonormal_pair()).collect();
     let mut fourfold = vec![DVec2::ZERO; normals.len()];
     for run in edges.chunk_by(Edge::joins) {
         let [a, b] = run[0].ends.map(|i| geometry.positions[i as usize].as_dvec3());

@@ -16,7 +16,6 @@ use crate::error::{Error, Result};
 use crate::simplify::{Cluster, SimplifiedGeometry, TriangleSource};
 use charts::{Charts, Frame};
 use grid::Grid;
-pub(super) use sampling::PatchPoint;
 
 const NONE: u32 = u32::MAX;
 
@@ -32,8 +31,8 @@ const SMALLEST_SHARE: f64 = 0.05;
 /// All patches of a geometry. Patch `p` has the sides `2 p` (front) and `2 p + 1` (back).
 #[derive(Clone, Debug)]
 pub(super) struct Patches {
-    maps: Vec<CellMap>,
-    cells: Vec<u32>,
+    /// From hits to patches.
+    pub map: PatchMap,
     first_piece: Vec<u32>,
     pieces: Vec<Piece>,
     /// Area of one side of each patch.
@@ -46,6 +45,15 @@ pub(super) struct Patches {
     pub box_cell: Vec<Option<BoxCell>>,
     /// Edge length that was used: the one asked for, or larger.
     pub size: f64,
+}
+
+/// From points on triangles to patches.
+#[derive(Clone, Debug, Default)]
+pub(super) struct PatchMap {
+    /// One a triangle.
+    maps: Vec<CellMap>,
+    /// Patch of each cell of all grids.
+    cells: Vec<u32>,
 }
 
 /// A patch of an equivalent box: index `j * n + i` of a face.
@@ -71,7 +79,7 @@ struct CellMap {
 
 /// A part of a triangle, itself a triangle in barycentrics.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Piece {
+struct Piece {
     triangle: u32,
     /// Share of the patch's area in this piece and all before it.
     share: f32,
@@ -119,8 +127,10 @@ impl Patches {
             .map(|&t| vector_area(geometry, t).normalize_or_zero().as_vec3())
             .collect();
         let mut patches = Patches {
-            maps: vec![CellMap::default(); geometry.triangles.len()],
-            cells: Vec::with_capacity(cells as usize),
+            map: PatchMap {
+                maps: vec![CellMap::default(); geometry.triangles.len()],
+                cells: Vec::with_capacity(cells as usize),
+            },
             first_piece: vec![0],
             pieces: Vec::new(),
             area: Vec::new(),
@@ -136,11 +146,11 @@ impl Patches {
     }
 
     fn append(&mut self, geometry: &SimplifiedGeometry, grid: &Grid, triangles: &[u32], part: Part) {
-        let (first_cell, first_patch) = (self.cells.len() as u32, self.area.len() as u32);
+        let (first_cell, first_patch) = (self.map.cells.len() as u32, self.area.len() as u32);
         for &t in triangles {
-            self.maps[t as usize] = CellMap::new(geometry, grid, t, first_cell);
+            self.map.maps[t as usize] = CellMap::new(geometry, grid, t, first_cell);
         }
-        self.cells.extend(part.cells.iter().map(|&p| first_patch + p));
+        self.map.cells.extend(part.cells.iter().map(|&p| first_patch + p));
         for (pieces, cell) in part.patches.into_iter().zip(part.patch_cells) {
             let area: f64 = pieces.iter().map(|p| p.0).sum();
             let mut sum = 0.0;
@@ -165,6 +175,13 @@ impl Patches {
         self.area.len()
     }
 
+    /// A triangle of the patch.
+    pub fn triangle(&self, patch: u32) -> u32 {
+        self.pieces[self.first_piece[patch as usize] as usize].triangle
+    }
+}
+
+impl PatchMap {
     /// The patch at barycentrics `u`, `v` of a triangle.
     pub fn at(&self, triangle: u32, u: f32, v: f32) -> u32 {
         let map = &self.maps[triangle as usize];
@@ -173,11 +190,6 @@ impl Patches {
         let x = (at.x as u32).min(u32::from(map.cells[0]) - 1);
         let y = (at.y as u32).min(u32::from(map.cells[1]) - 1);
         self.cells[(map.first + y * u32::from(map.cells[0]) + x) as usize]
-    }
-
-    /// A triangle of the patch.
-    pub fn triangle(&self, patch: u32) -> u32 {
-        self.pieces[self.first_piece[patch as usize] as usize].triangle
     }
 }
 
