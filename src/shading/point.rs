@@ -140,6 +140,9 @@ impl SurfacePoint {
     }
 }
 
+/// Rays start at least this far from their triangle, as a share of its size.
+const SMALLEST_OFFSET: f64 = 1e-12;
+
 /// Position, error bound and unit normal at barycentric weights `u` and `v` of the second and third corner.
 ///
 /// Evaluated in f64, so that the position's own error is its rounding to f32. The larger part of the bound is the
@@ -162,7 +165,9 @@ fn locate(corners: [Vec3; 3], u: f32, v: f32) -> (Vec3, Vec3, Vec3) {
     let test_error = |w: DVec3| 6.0 * TEST_ROUNDINGS * ROUNDOFF * w.x * w.y * w.z / double_area;
     // The origin moves off the triangle by the bound itself, which lengthens the vectors a little.
     let moved = normal.abs().dot(rounding) + test_error(extent);
-    let distance = test_error(extent + 2.0 * moved * normal.abs());
+    // In a plane through the origin along the axes all of this is zero, and rays started in the plane would hit it at 0.
+    let least = SMALLEST_OFFSET * extent.max_element();
+    let distance = test_error(extent + 2.0 * moved * normal.abs()).max(least);
     (position, (rounding + distance * normal.abs()).as_vec3(), normal.as_vec3())
 }
 

@@ -8,7 +8,7 @@ use super::*;
 fn rad_001_diffuse_furnace() {
     for (rho, expected) in [(0.0, 1.0), (0.1, 1.1111111), (0.3, 1.4285714), (0.5, 2.0), (0.7, 3.3333333), (0.9, 10.0)] {
         let room = closed_box([1.0; 3], [rho; 6], [1.0; 6]);
-        let solution = room.solve(&one_patch()).unwrap();
+        let solution = room.solve(&RadiosityParams { error: 3e-4, ..one_patch() }).unwrap();
         for face in 0..6 {
             assert_close(&format!("rho {rho} face {face}"), room.surface(&solution, face).1.x, expected, 1e-3);
         }
@@ -18,7 +18,7 @@ fn rad_001_diffuse_furnace() {
 #[test]
 fn rad_001_furnace_of_many_patches_agrees_within_its_own_deviation() {
     let room = closed_box([1.0; 3], [0.5; 6], [1.0; 6]);
-    let params = RadiosityParams { patch_size: 0.125, error: 5e-3, unshot: 1e-3, ..one_patch() };
+    let params = RadiosityParams { patch_size: 0.125, error: 1e-2, unshot: 1e-3, ..one_patch() };
     let solution = room.solve(&params).unwrap();
     assert_eq!(solution.patches, 6 * 64);
     let (mut squares, mut variance, mut total) = (0.0, 0.0, 0.0);
@@ -55,7 +55,7 @@ fn rad_004_three_bands() {
     let look = Material::emitter(Vec3::splat(1.0 / std::f32::consts::PI), Vec3::new(0.2, 0.5, 0.8));
     let surfaces = box_faces([1.0; 3]).map(|face| (diced(face, 1), look.clone()));
     let room = Room::new(surfaces.into(), Vec::new());
-    let solution = room.solve(&one_patch()).unwrap();
+    let solution = room.solve(&RadiosityParams { error: 3e-4, ..one_patch() }).unwrap();
     let (_, b) = room.surface(&solution, 3);
     for (band, expected) in [1.25, 2.0, 5.0].into_iter().enumerate() {
         assert_close(&format!("band {band}"), b[band], expected, 1e-3);
@@ -195,7 +195,7 @@ fn rad_012_and_013_energy_after_every_shot() {
 fn rad_012_stop_at_one_percent_loses_rho_times_unshot() {
     let room = closed_box([1.0; 3], [0.5; 6], [0.0, 0.0, 0.0, 0.0, 0.0, 1.0]);
     for ambient in [false, true] {
-        let solution = room.solve(&RadiosityParams { unshot: 0.01, ambient, ..one_patch() }).unwrap();
+        let solution = room.solve(&RadiosityParams { unshot: 0.01, ambient, error: 0.01, ..one_patch() }).unwrap();
         let flux: f64 = (0..6).map(|f| room.surface(&solution, f)).map(|(area, b)| area * b.x).sum();
         let loss = 1.0 - flux / 2.0;
         let unshot = solution.ledger.unshot_share();
@@ -229,7 +229,7 @@ fn rad_018_sealed_rooms_do_not_leak() {
         let dark = 6..surfaces.len();
         let room = Room::new(surfaces, Vec::new());
         for direct in [DirectLight::Shoot, DirectLight::Gather] {
-            let params = RadiosityParams { patch_size: 0.5, direct, error: 0.01, unshot: 1e-3, ..one_patch() };
+            let params = RadiosityParams { patch_size: 0.5, direct, error: 0.03, unshot: 1e-2, ..one_patch() };
             let solution = room.solve(&params).unwrap();
             assert_eq!(solution.ledger.escaped, [0.0; 3]);
             for face in dark.clone() {

@@ -60,7 +60,7 @@ fn rad_015_area_mean_in_a_closed_room() {
 fn gathered_and_shot_light_agree() {
     let room = closed_box([1.0; 3], [0.7, 0.1, 0.5, 0.3, 0.2, 0.8], [0.0, 2.0, 0.0, 0.0, 0.0, 1.0]);
     let solve = |direct| {
-        let params = RadiosityParams { direct, patch_size: 0.25, error: 2e-3, ..one_patch() };
+        let params = RadiosityParams { direct, patch_size: 0.25, error: 5e-3, ..one_patch() };
         room.solve(&params).unwrap()
     };
     let (shot, gathered) = (solve(DirectLight::Shoot), solve(DirectLight::Gather));
@@ -75,8 +75,8 @@ fn gathered_and_shot_light_agree() {
     }
     let rms = f64::sqrt(sum / f64::from(count));
     println!("rms {rms:.1e}, worst {worst:.1e}");
-    // Both have a mean relative error of at most 2e-3; patches that get little light have more.
-    assert!(rms < 0.01);
+    // Both have a mean relative error of at most 5e-3; patches that get little light have more.
+    assert!(rms < 0.02);
 }
 
 #[test]
