@@ -41,3 +41,37 @@ pub fn sample_visible(outgoing: Vec3, alpha: f32, u: [f32; 2]) -> Vec3 {
     let (sin, cos) = (TAU * u[1]).sin_cos();
     ((Vec3::new(sine * cos, sine * sin, 1.0 - depth) + view) * stretch).normalize()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// SPEC-010 of the reference cases, the weak white furnace: visible facets cover exactly the projected surface,
+    /// `int G1 D max(0, o.h) dh = mu`. Midpoint rule in azimuth and in tangent over alpha, mapped to 0..1.
+    #[test]
+    fn weak_white_furnace() {
+        const POINTS: u32 = 600;
+        const AZIMUTHS: u32 = 128;
+        for alpha in [0.05, 0.25, 1.0_f32] {
+            for cosine in [1.0, 0.5, 0.1_f32] {
+                let outgoing = Vec3::new((1.0 - cosine * cosine).sqrt(), 0.0, cosine);
+                let mut sum = 0.0;
+                for i in 0..POINTS {
+                    let x = (i as f32 + 0.5) / POINTS as f32;
+                    let tangent = alpha * x / (1.0 - x);
+                    let z = 1.0 / (1.0 + tangent * tangent).sqrt();
+                    let solid_angle = z * tangent * z * z * alpha / ((1.0 - x) * (1.0 - x));
+                    for j in 0..AZIMUTHS {
+                        let (sin, cos) = (TAU * (j as f32 + 0.5) / AZIMUTHS as f32).sin_cos();
+                        let h = Vec3::new(z * tangent * cos, z * tangent * sin, z);
+                        let visible = masking(outgoing, alpha) * outgoing.dot(h).max(0.0) / cosine;
+                        sum += f64::from(distribution(h, alpha) * visible * solid_angle);
+                    }
+                }
+                let share = sum * f64::from(TAU) / f64::from(POINTS * AZIMUTHS);
+                // The tolerance of the reference case.
+                assert!((share - 1.0).abs() < 0.001, "{alpha} {cosine}: {share}");
+            }
+        }
+    }
+}

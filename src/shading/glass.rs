@@ -37,8 +37,8 @@ pub struct Glass {
     normal_reflectance: f32,
     specular: f32,
     specular_color: Vec3,
-    /// Share of the material that is glass.
-    share: f32,
+    /// Share of the material that is glass, times what makes up for masked facets.
+    scale: f32,
     /// Transmitted light is multiplied with it: base colour.
     tint: Vec3,
     /// Whether shadow rays pass through.
@@ -61,9 +61,18 @@ impl Glass {
             normal_reflectance: fresnel::at_normal(ior),
             specular: material.specular,
             specular_color: material.specular_color,
-            share,
+            scale: share,
             tint: at.base_color,
             pane,
+        }
+    }
+
+    /// Returns what masking takes from a rough sheet, given the lossless albedo towards the viewer (Turquin 2019): its
+    /// lobes on both sides have the shape of the reflecting one. Refracting solids keep that loss.
+    pub fn with_compensation(self, lossless_albedo: f32) -> Self {
+        match self.geometry {
+            Geometry::Solid { .. } => self,
+            _ => Glass { scale: self.scale / lossless_albedo, ..self },
         }
     }
 
@@ -92,7 +101,7 @@ impl Glass {
                 Some(_) => self.colored(fresnel::unpolarised(along, eta)),
             },
         };
-        (self.share * reflected, self.share * (Vec3::ONE - reflected) * self.tint)
+        (self.scale * reflected, self.scale * (Vec3::ONE - reflected) * self.tint)
     }
 
     /// `KHR_materials_specular`: strength everywhere, colour at normal incidence and none at grazing.
@@ -175,6 +184,7 @@ impl Glass {
                 sum += transmitted * masked(through);
             }
         }
-        sum / (ALBEDO_POINTS * ALBEDO_POINTS) as f32
+        // The rule's error may exceed what little is lost.
+        (sum / (ALBEDO_POINTS * ALBEDO_POINTS) as f32).min(Vec3::ONE)
     }
 }

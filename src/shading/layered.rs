@@ -95,7 +95,7 @@ impl Layered {
     pub fn new(material: &Material, kind: PartKind, at: &Local, glossy_threshold: f32) -> Self {
         let transmission = (1.0 - at.metallic) * material.transmission;
         let opaque = (1.0 - at.metallic) - transmission;
-        let glass = (transmission > 0.0).then(|| Glass::new(material, kind, transmission, at));
+        let mut glass = (transmission > 0.0).then(|| Glass::new(material, kind, transmission, at));
         let roughness = match &glass {
             // Nothing bends light at a boundary between equal indices, however rough.
             Some(glass) if glass.is_index_matched() => 0.0,
@@ -129,6 +129,7 @@ impl Layered {
             average = albedo::average(roughness);
             coat.multiple = multiple_color(coat.f0, coat.f90, average.total());
             multiple = opaque * coat.multiple + at.metallic * multiple_color(at.base_color, Vec3::ONE, average.total());
+            glass = glass.map(|glass| glass.with_compensation(here.total()));
             multiple_scale = 1.0 / (1.0 - average.total()).max(f32::MIN_POSITIVE);
         }
         let f0 = at.metallic * at.base_color + opaque * coat.f0;

@@ -12,6 +12,8 @@ mod layered;
 pub mod point;
 #[cfg(test)]
 mod testing;
+#[cfg(test)]
+mod tests;
 
 pub use bsdf::{Bsdf, BsdfSample};
 pub use point::SurfacePoint;

@@ -1,6 +1,6 @@
 //! Surface points with error bounds, and ray origins that stay on the right side.
 
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec3, Mat3, Vec2, Vec3};
 
 use crate::backend::Hit;
 use crate::scene::{Material, Scene};
@@ -117,25 +117,19 @@ impl SurfacePoint {
     }
 
     /// The shading normal as the normal map bends it; `None` where texture coordinates span no area.
-    ///
-    /// The tangent follows the texture's u; glTF maps have +y up in the image, against v.
     fn mapped_normal(&self, scene: &Scene, material: &Material) -> Option<Vec3> {
         let slot = material.normal_texture.as_ref()?;
         let set = usize::from(slot.uv_set);
         let coordinates = scene.mesh.uvs.get(set).filter(|uvs| !uvs.is_empty())?;
         let [a, b, c] = scene.mesh.triangles[self.triangle as usize].map(|i| coordinates[i as usize]);
         let [duv1, duv2] = [b - a, c - a].map(|d| slot.transform.transform_vector2(d));
-        let [pa, pb, pc] = scene.mesh.corners(self.triangle);
-        let area = duv1.perp_dot(duv2);
-        let dp_du = ((pb - pa) * duv2.y - (pc - pa) * duv1.y) * area.signum();
-        let n = self.shading_normal;
-        let tangent = (dp_du - n * n.dot(dp_du)).try_normalize().filter(|_| area != 0.0)?;
-        let bitangent = n.cross(tangent) * -area.signum();
+        let [a, b, c] = scene.mesh.corners(self.triangle);
+        let frame = texture_frame(self.shading_normal, [b - a, c - a], [duv1, duv2])?;
 
         let uv = slot.transform.transform_point2(self.uv[set]);
         let map = 2.0 * scene.textures[slot.texture as usize].sample(uv).truncate() - Vec3::ONE;
         let scale = material.normal_scale;
-        let bent = (tangent * (map.x * scale) + bitangent * (map.y * scale) + n * map.z).try_normalize()?;
+        let bent = (frame * Vec3::new(map.x * scale, map.y * scale, map.z)).try_normalize()?;
         (bent.dot(self.geometric_normal) > 0.0).then_some(bent)
     }
 }
@@ -169,6 +163,19 @@ fn locate(corners: [Vec3; 3], u: f32, v: f32) -> (Vec3, Vec3, Vec3) {
     let least = SMALLEST_OFFSET * extent.max_element();
     let distance = test_error(extent + 2.0 * moved * normal.abs()).max(least);
     (position, (rounding + distance * normal.abs()).as_vec3(), normal.as_vec3())
+}
+
+/// Axes of a normal map on a triangle with these edges in space and in texture coordinates: x along u, y up in the
+/// image, which is against v, z along `normal`.
+fn texture_frame(normal: Vec3, edges: [Vec3; 2], uv_edges: [Vec2; 2]) -> Option<Mat3> {
+    let area = uv_edges[0].perp_dot(uv_edges[1]);
+    if area == 0.0 {
+        return None;
+    }
+    let along_u = (edges[0] * uv_edges[1].y - edges[1] * uv_edges[0].y) * area.signum();
+    let tangent = (along_u - normal * normal.dot(along_u)).try_normalize()?;
+    // Seen from the front, an image that is not mirrored has v clockwise from u: negative area.
+    Some(Mat3::from_cols(tangent, normal.cross(tangent) * -area.signum(), normal))
 }
 
 /// `normal`, turned towards `geometric` until it is at most 89 degrees away.
@@ -315,7 +322,12 @@ mod tests {
     #[test]
     fn position_error_is_bounded() {
         for seed in 0..2000 {
-            let corners = wild_triangle(seed);
+            let mut corners = wild_triangle(seed);
+            if seed % 2 == 0 {
+                // In a plane along the axes the bound is that of the position alone.
+                corners[1].z = corners[0].z;
+                corners[2].z = corners[0].z;
+            }
             let (u, v) = barycentrics(seed);
             let scene = scene_of(corners, Material::default());
             let point = SurfacePoint::new(&scene, &Hit { t: 1.0, u, v, triangle: 0 });
@@ -340,5 +352,18 @@ mod tests {
         scene.mesh.normals = vec![Vec3::X; 3];
         let limited = SurfacePoint::new(&scene, &hit).shading_normal;
         assert!((limited.z - MIN_NORMAL_COSINE).abs() < 1e-6 && limited.is_normalized());
+    }
+
+    #[test]
+    fn normal_map_axes_follow_the_image() {
+        // A unit square seen from +z with the image upright on it: v runs down.
+        let upright = |x: f32, y: f32| Vec2::new(x, 1.0 - y);
+        let uv_edges = [upright(1.0, 0.0) - upright(0.0, 0.0), upright(0.0, 1.0) - upright(0.0, 0.0)];
+        assert_eq!(texture_frame(Vec3::Z, [Vec3::X, Vec3::Y], uv_edges), Some(Mat3::IDENTITY));
+        // Mirrored: u runs to the left, up stays up.
+        let mirrored = uv_edges.map(|d| Vec2::new(-d.x, d.y));
+        let expected = Mat3::from_cols(Vec3::NEG_X, Vec3::Y, Vec3::Z);
+        assert_eq!(texture_frame(Vec3::Z, [Vec3::X, Vec3::Y], mirrored), Some(expected));
+        assert_eq!(texture_frame(Vec3::Z, [Vec3::X, Vec3::Y], [Vec2::ONE; 2]), None);
     }
 }
