@@ -7,7 +7,7 @@ use super::RadiosityScene;
 use super::patches::Patches;
 use super::shoot::side_normal;
 use crate::backend::Ray;
-use crate::lighting::shadow;
+use crate::lighting::shadow::{ShadowRay, visibility};
 use crate::sampling;
 
 /// Samples a side gets before it is known how much it varies.
@@ -16,8 +16,6 @@ const PILOT: u32 = 8;
 const SAMPLES: (u32, u32) = (4, 1024);
 /// Sides looked at by one job.
 const JOB: usize = 64;
-/// Shadow rays end short of the light by this share, so that they do not meet it.
-const SHORTEN: f32 = 1.0 - 1.0 / 1024.0;
 
 /// Direct light on all sides.
 pub(super) struct Direct {
@@ -87,11 +85,11 @@ fn estimate(input: &RadiosityScene<'_>, patches: &Patches, counts: &[u32], strea
                     }
                 }
             }
-            let mut visibility = vec![glam::Vec3::ONE; rays.len()];
-            shadow::visibility(input.rays, input.scene, Some(&input.geometry.sources), &rays, &mut visibility);
+            let mut through = vec![glam::Vec3::ONE; rays.len()];
+            visibility(input.rays, input.scene, Some(&input.geometry.sources), &rays, &mut through);
             let mut estimates = vec![Estimate::default(); counts.len()];
             let mut squares = vec![0.0; counts.len()];
-            for ((k, value), seen) in values.into_iter().zip(visibility) {
+            for ((k, value), seen) in values.into_iter().zip(through) {
                 let value = value * seen.as_dvec3();
                 estimates[k].mean += value;
                 estimates[k].rays += 1;
@@ -108,7 +106,13 @@ fn estimate(input: &RadiosityScene<'_>, patches: &Patches, counts: &[u32], strea
 }
 
 /// A shadow ray and the irradiance it brings when nothing is in its way.
-fn sample(input: &RadiosityScene<'_>, patches: &Patches, side: u32, index: u32, stream: u32) -> Option<(Ray, DVec3)> {
+fn sample(
+    input: &RadiosityScene<'_>,
+    patches: &Patches,
+    side: u32,
+    index: u32,
+    stream: u32,
+) -> Option<(ShadowRay, DVec3)> {
     let stream = sampling::hash_all(&[stream, side]);
     let s = sampling::sobol(index, 0, stream);
     let choice = sampling::sobol(index, 1, stream)[0];
@@ -123,7 +127,8 @@ fn sample(input: &RadiosityScene<'_>, patches: &Patches, side: u32, index: u32, 
         origin: point.ray_origin(light.direction),
         t_near: 0.0,
         direction: light.direction,
-        t_far: light.distance * SHORTEN,
+        t_far: light.distance,
     };
-    Some((ray, f64::from(cos) * light.weight.as_dvec3()))
+    let shadow = ShadowRay { ray, light: light.triangle };
+    Some((shadow, f64::from(cos) * light.weight.as_dvec3()))
 }

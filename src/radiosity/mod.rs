@@ -27,14 +27,14 @@ use crate::sampling;
 use crate::scene::Scene;
 use crate::simplify::{Cluster, SimplifiedGeometry};
 use direct::Direct;
-use ledger::Tally;
 pub use ledger::Ledger;
+use ledger::Tally;
 use optics::Optics;
 use patches::Patches;
 use refine::Run;
 use shoot::Tracer;
-pub use solution::Solution;
 use solution::PatchSolution;
+pub use solution::Solution;
 
 /// Parameters of [`solve`].
 #[derive(Clone, Debug, PartialEq)]
@@ -116,7 +116,7 @@ const FIRST_RAYS: u64 = 64;
 /// Fewest and most rays that the light of the first bounce is shot with.
 const RAYS: (u64, u64) = (1 << 15, 1 << 36);
 /// Solutions that may be averaged to reach the error.
-const MAX_ROUNDS: u32 = 3;
+const MAX_ROUNDS: u32 = 4;
 
 /// Solves for all radiosities.
 ///
@@ -170,9 +170,7 @@ impl Average {
     fn solve(&mut self, tracer: &Tracer<'_>, params: &RadiosityParams, progress: &Progress) -> Result<()> {
         let target = f64::from(params.error);
         let direct = match params.direct {
-            DirectLight::Gather => {
-                Some(direct::gather(tracer.input, tracer.patches, params.seed, 0.5 * target))
-            }
+            DirectLight::Gather => Some(direct::gather(tracer.input, tracer.patches, params.seed, 0.5 * target)),
             DirectLight::Shoot => None,
         };
         self.rays += direct.as_ref().map_or(0, |d| d.rays);
@@ -192,8 +190,9 @@ impl Average {
                 return Ok(());
             }
             let excess = (error.powi(2) - of_direct.powi(2)).max(0.0) / (target.powi(2) - of_direct.powi(2));
-            // A tenth more, as the estimate is itself uncertain.
-            let needed = 1.1 * excess * total as f64;
+            // Low-discrepancy rays converge faster than the square root: measured slopes are near -0.63. A tenth more, as the
+            // estimate is itself uncertain.
+            let needed = 1.1 * excess.powf(0.8) * total as f64;
             rays = ((needed - total as f64).max(0.25 * total as f64) as u64).min(RAYS.1);
         }
         let error = self.error(tracer.optics);

@@ -106,8 +106,7 @@ fn mean(input: &RadiosityScene<'_>, patches: &Patches, patch: u32) -> Mean {
     };
     let scene = input.scene;
     let look = material(scene, triangle);
-    let varies =
-        look.base_color_texture.is_some() || look.emission_texture.is_some() || !scene.mesh.colors.is_empty();
+    let varies = look.base_color_texture.is_some() || look.emission_texture.is_some() || !scene.mesh.colors.is_empty();
     if look.is_lambertian() && !varies {
         return Mean { reflectance: look.base_color, radiance: look.emission, specular: false };
     }

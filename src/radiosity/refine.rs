@@ -165,7 +165,8 @@ impl<'a> Run<'a> {
             return self.incident.clone();
         }
         let ledger = self.ledger();
-        let mut lost = self.tally.escaped - self.tally_direct.escaped + self.tally.lost - self.tally_direct.lost
+        let mut lost = self.tally.escaped - self.tally_direct.escaped + self.tally.lost
+            - self.tally_direct.lost
             - (self.tally.passed_on - self.tally_direct.passed_on);
         for (side, (incident, direct)) in self.incident.iter().zip(&self.direct).enumerate() {
             lost += (1.0 - self.reflectance(side)) * (incident - direct);

@@ -130,7 +130,8 @@ impl Tracer<'_> {
                 let local = sampling::cosine_hemisphere(Vec2::new(s[2], s[3]));
                 let direction = sampling::basis(side_normal(&point, shot.side)) * local;
                 let id = u64::from(shot.stream) << 32 | index;
-                photons.push(Ray::new(point.ray_origin(direction), direction), Load { flux: shot.flux, id, bent: false });
+                photons
+                    .push(Ray::new(point.ray_origin(direction), direction), Load { flux: shot.flux, id, bent: false });
             }
         };
         self.trace(total, &emit, Deposit::All, incident)

@@ -49,8 +49,7 @@ pub(super) fn grow(geometry: &SimplifiedGeometry, min_cos: f64) -> Charts {
     let welded = weld(geometry);
     let edges = sorted_edges(geometry, &welded);
     let neighbours = neighbours(&edges, geometry.triangles.len());
-    let vector_areas: Vec<DVec3> =
-        geometry.triangles.par_iter().map(|&t| super::vector_area(geometry, t)).collect();
+    let vector_areas: Vec<DVec3> = geometry.triangles.par_iter().map(|&t| super::vector_area(geometry, t)).collect();
     let mut of_triangle = vec![NONE; geometry.triangles.len()];
     let mut normals = Vec::new();
     let mut queue = VecDeque::new();

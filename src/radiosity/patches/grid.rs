@@ -116,7 +116,11 @@ impl Grid {
                     // Barycentrics span the triangle (0,0) (1,0) (0,1), whose area is one half.
                     let share = (uv[1] - uv[0]).perp_dot(uv[2] - uv[0]).abs();
                     if share > 1e-12 {
-                        pieces.push((number, share * area, Piece { triangle, share: 0.0, uv: uv.map(|p| p.as_vec2()) }));
+                        pieces.push((
+                            number,
+                            share * area,
+                            Piece { triangle, share: 0.0, uv: uv.map(|p| p.as_vec2()) },
+                        ));
                     }
                 }
             }

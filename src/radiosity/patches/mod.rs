@@ -121,11 +121,8 @@ impl Patches {
         let parts: Vec<Part> =
             grids.par_iter().zip(&members).map(|(grid, triangles)| part(geometry, grid, triangles)).collect();
 
-        let normals = geometry
-            .triangles
-            .par_iter()
-            .map(|&t| vector_area(geometry, t).normalize_or_zero().as_vec3())
-            .collect();
+        let normals =
+            geometry.triangles.par_iter().map(|&t| vector_area(geometry, t).normalize_or_zero().as_vec3()).collect();
         let mut patches = Patches {
             map: PatchMap {
                 maps: vec![CellMap::default(); geometry.triangles.len()],

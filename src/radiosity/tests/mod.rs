@@ -54,7 +54,8 @@ impl Room {
         mesh.bounds = Aabb::of(mesh.positions.iter().copied());
         geometry.positions = mesh.positions.clone();
         geometry.triangles = mesh.triangles.clone();
-        geometry.sources = (0..mesh.triangles.len() as u32).map(|triangle| TriangleSource::Scene { triangle }).collect();
+        geometry.sources =
+            (0..mesh.triangles.len() as u32).map(|triangle| TriangleSource::Scene { triangle }).collect();
         geometry.surfaces = mesh.objects.len() as u32;
         geometry.parts = mesh.parts();
         let scene = Scene { mesh, materials, lights, ..Scene::default() };
@@ -110,6 +111,13 @@ impl Room {
     }
 }
 
+/// Mean radiosity without emission of the fronts of all patches, which must have equal areas. Exact, unlike
+/// [`Room::surface`], which samples.
+fn mean_over_patches(solution: &Solution) -> f64 {
+    let sum: f64 = solution.of_patch.iter().map(|p| f64::from(p.radiosity[0].x)).sum();
+    sum / solution.patches as f64
+}
+
 /// Lambertian material of exitance `e`.
 fn material(rho: f32, e: f32) -> Material {
     Material::emitter(Vec3::splat(e / std::f32::consts::PI), Vec3::splat(rho))
@@ -149,13 +157,7 @@ fn closed_box(size: [f32; 3], rho: [f32; 6], exitance: [f32; 6]) -> Room {
 
 /// One patch a face, light sources shoot. A tolerance of 5e-3 is five standard errors.
 fn one_patch() -> RadiosityParams {
-    RadiosityParams {
-        unshot: 1e-4,
-        direct: DirectLight::Shoot,
-        error: 1e-3,
-        seed: 1,
-        ..RadiosityParams::new(1e6)
-    }
+    RadiosityParams { unshot: 1e-4, direct: DirectLight::Shoot, error: 1e-3, seed: 1, ..RadiosityParams::new(1e6) }
 }
 
 fn assert_close(what: &str, value: f64, expected: f64, relative: f64) {
