@@ -42,7 +42,7 @@ struct Estimate {
 pub(super) fn gather(input: &RadiosityScene<'_>, patches: &Patches, seed: u32, target: f64) -> Direct {
     let sides = 2 * patches.len();
     let area = |side: usize| patches.area[side / 2];
-    let stream = |what: u32| sampling::hash_all(&[seed, 0xd19e_c7, what]);
+    let stream = |what: u32| sampling::hash_all(&[seed, 0x00d1_9ec7, what]);
     let pilot = estimate(input, patches, &vec![PILOT; sides], stream(2));
     // Sum of standard errors is least for samples in proportion to (A sigma)^(2/3).
     let spread: Vec<f64> = pilot.iter().enumerate().map(|(s, e)| area(s) * e.variance.sqrt()).collect();

@@ -88,7 +88,7 @@ fn emit(scene: &Scene, lights: &Lights, range: Range<u64>, count: u64, stream: u
             continue;
         };
         let flux = emitted.flux.as_dvec3() / count as f64;
-        photons.push(off_surface(scene, &emitted), Load { flux, id: u64::from(stream) << 32 | k, bent: false });
+        photons.push(off_surface(scene, &emitted), Load::new(flux, u64::from(stream) << 32 | k));
     }
 }
 

@@ -24,6 +24,14 @@ const MAX_CHAIN: usize = 32;
 /// Weight under which photons go on only with proportional probability.
 const ROULETTE: f32 = 0.25;
 
+/// Barycentric distance from a triangle's edge within which a hit is not trusted: where a wall ends at a floor, the floor beyond the
+/// wall may be met at the same rounded distance as the wall.
+const EDGE: f32 = 1e-6;
+/// How far such a ray is turned before it is traced again, radians at most.
+const TURN: f32 = 1e-4;
+/// How often a ray is traced again.
+const RETRIES: u8 = 4;
+
 /// Light of one patch side that is shot with equal shares over a number of rays.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Shot {
@@ -46,6 +54,37 @@ pub(super) struct Load {
     pub id: u64,
     /// Whether a mirror or a refracting surface has changed its course.
     pub bent: bool,
+    /// How often it was traced again because it met an edge.
+    pub retries: u8,
+}
+
+impl Load {
+    /// A load that sets out.
+    pub fn new(flux: DVec3, id: u64) -> Self {
+        Load { flux, id, bent: false, retries: 0 }
+    }
+
+    /// Random numbers of its own, for step `depth` of its way.
+    fn random(&self, depth: u32) -> impl FnMut() -> f32 + use<> {
+        let mut key = sampling::hash_all(&[self.id as u32, (self.id >> 32) as u32, depth]);
+        move || {
+            key = sampling::hash(key.wrapping_add(0x9e37_79b9));
+            sampling::unit(key)
+        }
+    }
+
+    /// The ray and load for another try, when `hit` lies on an edge. Scaling the axes apart keeps a grazing ray above the
+    /// surface it left, for surfaces along the axes at least.
+    fn again(&self, ray: &Ray, hit: &Hit, depth: u32) -> Option<(Ray, Load)> {
+        let inside = hit.u.min(hit.v).min(1.0 - hit.u - hit.v);
+        if inside > EDGE || self.retries == RETRIES {
+            return None;
+        }
+        let mut random = self.random(depth);
+        let scale = Vec3::new(random(), random(), random()) * TURN + 1.0;
+        let ray = Ray { direction: (ray.direction * scale).normalize(), ..*ray };
+        Some((ray, Load { retries: self.retries + 1, ..*self }))
+    }
 }
 
 /// Rays and what they carry, index by index.
@@ -130,8 +169,7 @@ impl Tracer<'_> {
                 let local = sampling::cosine_hemisphere(Vec2::new(s[2], s[3]));
                 let direction = sampling::basis(side_normal(&point, shot.side)) * local;
                 let id = u64::from(shot.stream) << 32 | index;
-                photons
-                    .push(Ray::new(point.ray_origin(direction), direction), Load { flux: shot.flux, id, bent: false });
+                photons.push(Ray::new(point.ray_origin(direction), direction), Load::new(shot.flux, id));
             }
         };
         self.trace(total, &emit, Deposit::All, incident)
@@ -186,6 +224,10 @@ impl Tracer<'_> {
                     }
                     continue;
                 }
+                if let Some((ray, load)) = load.again(ray, hit, depth as u32) {
+                    next.push(ray, load);
+                    continue;
+                }
                 let patch = self.patches.map.at(hit.triangle, hit.u, hit.v);
                 if counts {
                     let front = ray.direction.dot(self.patches.normals[hit.triangle as usize]) < 0.0;
@@ -215,11 +257,7 @@ impl Tracer<'_> {
         let scene = self.input.scene;
         let point = SurfacePoint::new(scene, &Hit { triangle, ..*hit });
         let bsdf = Bsdf::new(scene, &point, -direction, GLOSSY_THRESHOLD);
-        let mut key = sampling::hash_all(&[load.id as u32, (load.id >> 32) as u32, depth]);
-        let mut random = || {
-            key = sampling::hash(key.wrapping_add(0x9e37_79b9));
-            sampling::unit(key)
-        };
+        let mut random = load.random(depth);
         let sample = bsdf.sample_high([random(), random(), random()])?;
         let material = &scene.materials[scene.mesh.object(triangle).material as usize];
         let mut weight = sample.weight;
@@ -236,7 +274,7 @@ impl Tracer<'_> {
             return None;
         }
         let flux = load.flux * (weight / survival).as_dvec3();
-        let load = Load { flux, id: load.id, bent: load.bent || !sample.straight };
+        let load = Load { flux, bent: load.bent || !sample.straight, ..*load };
         Some((Ray::new(point.ray_origin(sample.direction), sample.direction), load))
     }
 }

@@ -92,3 +92,14 @@ fn number_of_patches_is_bounded() {
     assert!((500..=1000).contains(&patches.len()), "{}", patches.len());
     assert!(patches.size > 1e-4);
 }
+
+/// As many patches as the paper's N+C scene, which its authors could not finish.
+#[test]
+#[ignore = "takes a minute"]
+fn seventy_five_thousand_patches() {
+    let room = closed_box([5.0, 4.0, 2.75], [0.56; 6], [0.0, 0.0, 0.0, 1.0, 0.0, 0.0]);
+    let solution = room.solve(&RadiosityParams { error: 0.02, ..RadiosityParams::new(0.0345) }).unwrap();
+    assert!((70_000..80_000).contains(&solution.patches) && solution.error < 0.021);
+    let solution = room.solve(&RadiosityParams { error: 0.02, ..RadiosityParams::new(0.15) }).unwrap();
+    assert!(solution.error < 0.021);
+}
