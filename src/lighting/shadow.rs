@@ -31,7 +31,7 @@ pub struct ShadowRay {
 /// shine on what lies behind the wall.
 ///
 /// `rays` was built from the triangles of `scene`, or from others whose sources are given as `sources`.
-pub fn visibility(
+pub fn light_visibility(
     rays: &dyn RayScene,
     scene: &Scene,
     sources: Option<&[TriangleSource]>,
@@ -85,6 +85,29 @@ fn in_scene(sources: Option<&[TriangleSource]>, triangle: u32) -> Option<u32> {
         None => Some(triangle),
         Some(TriangleSource::Scene { triangle }) => Some(triangle),
         Some(TriangleSource::BoxFace { .. }) => None,
+    }
+}
+
+/// Share of light that comes through along each of `batch`, for use with any number of rays at once: 0 where something
+/// opaque lies between `t_near` and `t_far`, else the product of the transmittances of all panes in between.
+///
+/// `rays` was built from the triangles of `scene`, or from others whose sources are given as `sources`.
+pub fn visibility(
+    rays: &dyn RayScene,
+    scene: &Scene,
+    sources: Option<&[TriangleSource]>,
+    batch: &[Ray],
+    through: &mut [Vec3],
+) {
+    let panes = scene.mesh.objects.iter().any(|o| o.kind == PartKind::Pane);
+    let visible = if panes { Visible::WithoutPanes } else { Visible::All };
+    let mut occluded = vec![false; batch.len()];
+    rays.occluded(batch, visible, Coherence::Coherent, &mut occluded);
+    for (share, blocked) in through.iter_mut().zip(&occluded) {
+        *share = if *blocked { Vec3::ZERO } else { Vec3::ONE };
+    }
+    if panes {
+        pass_panes(rays, scene, sources, batch, through);
     }
 }
 

@@ -7,7 +7,7 @@ use super::RadiosityScene;
 use super::patches::Patches;
 use super::shoot::side_normal;
 use crate::backend::Ray;
-use crate::lighting::shadow::{ShadowRay, visibility};
+use crate::lighting::shadow::{ShadowRay, light_visibility};
 use crate::sampling;
 
 /// Samples a side gets before it is known how much it varies.
@@ -86,7 +86,7 @@ fn estimate(input: &RadiosityScene<'_>, patches: &Patches, counts: &[u32], strea
                 }
             }
             let mut through = vec![glam::Vec3::ONE; rays.len()];
-            visibility(input.rays, input.scene, Some(&input.geometry.sources), &rays, &mut through);
+            light_visibility(input.rays, input.scene, Some(&input.geometry.sources), &rays, &mut through);
             let mut estimates = vec![Estimate::default(); counts.len()];
             let mut squares = vec![0.0; counts.len()];
             for ((k, value), seen) in values.into_iter().zip(through) {

@@ -8,7 +8,7 @@ use crate::simplify::SimplifiedGeometry;
 
 /// How far points are drawn towards the middle of their piece, as a share of its size: a point on an edge may by rounding lie
 /// behind the wall that meets it there.
-const INSET: f32 = 1.0 / 65_536.0;
+const INSET: f32 = 1.0 / 1_048_576.0;
 
 impl Patches {
     /// The point of `patch` that belongs to `s`, uniform in 0..1, as barycentrics of a triangle.
