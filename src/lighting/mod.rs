@@ -7,6 +7,7 @@ mod area;
 mod bounds;
 mod emission;
 mod punctual;
+pub mod shadow;
 mod spherical;
 mod tree;
 

@@ -10,6 +10,84 @@ use crate::simplify::TriangleSource;
 /// Panes that a shadow ray passes before it is given up as blocked.
 const MAX_PANES: usize = 64;
 
+/// How far from the light a hit may lie that is put down to rounding, as a share of the distance.
+const NEAR_LIGHT: f32 = 1.0 / 1024.0;
+/// Cosine of the angle up to which a surface at the light counts as lying in its plane.
+const COPLANAR: f32 = 0.999;
+
+/// A shadow ray: from a surface to a sampled point on a light.
+#[derive(Clone, Copy, Debug)]
+pub struct ShadowRay {
+    /// The ray, unit direction, with [`Ray::t_far`] at the light.
+    pub ray: Ray,
+    /// The emitting triangle of the scene ([`LightSample::triangle`](super::LightSample::triangle)), or [`Hit::NONE`].
+    pub light: u32,
+}
+
+/// Share of light that comes through along each of `batch`: 0 where something opaque lies between the surface and the
+/// light, else the product of the transmittances of all panes in between.
+///
+/// The nearest hit decides, and not whether there is one before a margin: with a margin, light sampled close to a wall would
+/// shine on what lies behind the wall.
+///
+/// `rays` was built from the triangles of `scene`, or from others whose sources are given as `sources`.
+pub fn light_visibility(
+    rays: &dyn RayScene,
+    scene: &Scene,
+    sources: Option<&[TriangleSource]>,
+    batch: &[ShadowRay],
+    through: &mut [Vec3],
+) {
+    let panes = scene.mesh.objects.iter().any(|o| o.kind == PartKind::Pane);
+    let visible = if panes { Visible::WithoutPanes } else { Visible::All };
+    let beyond = |shadow: &ShadowRay| match shadow.light {
+        Hit::NONE => shadow.ray,
+        _ => Ray { t_far: shadow.ray.t_far * (1.0 + NEAR_LIGHT), ..shadow.ray },
+    };
+    let queries: Vec<Ray> = batch.iter().map(beyond).collect();
+    let mut hits = vec![Hit::MISS; batch.len()];
+    rays.closest(&queries, visible, Coherence::Coherent, &mut hits);
+    for ((share, shadow), hit) in through.iter_mut().zip(batch).zip(&hits) {
+        *share = if reaches(scene, sources, shadow, hit) { Vec3::ONE } else { Vec3::ZERO };
+    }
+    if panes {
+        let batch: Vec<Ray> = batch
+            .iter()
+            .map(
+                |s| if s.light == Hit::NONE { s.ray } else { Ray { t_far: s.ray.t_far * (1.0 - NEAR_LIGHT), ..s.ray } },
+            )
+            .collect();
+        pass_panes(rays, scene, sources, &batch, through);
+    }
+}
+
+/// Whether a shadow ray whose nearest hit is `hit` reaches its light.
+fn reaches(scene: &Scene, sources: Option<&[TriangleSource]>, shadow: &ShadowRay, hit: &Hit) -> bool {
+    if !hit.is_hit() {
+        return true;
+    }
+    if shadow.light == Hit::NONE || hit.t < shadow.ray.t_far * (1.0 - NEAR_LIGHT) {
+        return false;
+    }
+    let Some(triangle) = in_scene(sources, hit.triangle) else {
+        return false;
+    };
+    let mesh = &scene.mesh;
+    // Next to the light: the light itself, its neighbour, or what lies in one plane with it.
+    triangle == shadow.light
+        || scene.materials[mesh.object(triangle).material as usize].is_emitter()
+        || mesh.normal(triangle).dot(mesh.normal(shadow.light)).abs() > COPLANAR
+}
+
+/// The triangle of the scene that a hit is on; `None` for equivalent boxes.
+fn in_scene(sources: Option<&[TriangleSource]>, triangle: u32) -> Option<u32> {
+    match sources.map(|s| s[triangle as usize]) {
+        None => Some(triangle),
+        Some(TriangleSource::Scene { triangle }) => Some(triangle),
+        Some(TriangleSource::BoxFace { .. }) => None,
+    }
+}
+
 /// Share of light that comes through along each of `batch`, for use with any number of rays at once: 0 where something
 /// opaque lies between `t_near` and `t_far`, else the product of the transmittances of all panes in between.
 ///
@@ -57,10 +135,8 @@ fn pass_panes(
             let Some(hit) = hit.next().filter(|h| h.is_hit()) else {
                 return false;
             };
-            let triangle = match sources.map(|s| s[hit.triangle as usize]) {
-                None => hit.triangle,
-                Some(TriangleSource::Scene { triangle }) => triangle,
-                Some(TriangleSource::BoxFace { .. }) => return false, // boxes are no panes
+            let Some(triangle) = in_scene(sources, hit.triangle) else {
+                return false; // boxes are no panes
             };
             let point = SurfacePoint::new(scene, &Hit { triangle, ..*hit });
             // The threshold only sorts reflections.

@@ -81,6 +81,22 @@ impl SurfacePoint {
         point
     }
 
+    /// The point at `u`, `v` of a triangle with the given corners, which need not belong to a scene: flat, without texture
+    /// coordinates. `triangle` is only stored.
+    pub fn flat(corners: [Vec3; 3], triangle: u32, u: f32, v: f32) -> Self {
+        let (position, error, normal) = locate(corners, u, v);
+        SurfacePoint {
+            position,
+            error,
+            geometric_normal: normal,
+            shading_normal: normal,
+            uv: [Vec2::ZERO; 2],
+            triangle,
+            u,
+            v,
+        }
+    }
+
     /// Origin for a ray that leaves into `direction`: moved along the geometric normal to the side of `direction`
     /// by the error bound, and rounded away from the surface (pbrt 4ed 6.8.6).
     pub fn ray_origin(&self, direction: Vec3) -> Vec3 {
@@ -118,6 +134,9 @@ impl SurfacePoint {
     }
 }
 
+/// Rays start at least this far from their triangle, as a share of its size.
+const SMALLEST_OFFSET: f64 = 1e-12;
+
 /// Position, error bound and unit normal at barycentric weights `u` and `v` of the second and third corner.
 ///
 /// Evaluated in f64, so that the position's own error is its rounding to f32. The larger part of the bound is the
@@ -140,7 +159,9 @@ fn locate(corners: [Vec3; 3], u: f32, v: f32) -> (Vec3, Vec3, Vec3) {
     let test_error = |w: DVec3| 6.0 * TEST_ROUNDINGS * ROUNDOFF * w.x * w.y * w.z / double_area;
     // The origin moves off the triangle by the bound itself, which lengthens the vectors a little.
     let moved = normal.abs().dot(rounding) + test_error(extent);
-    let distance = test_error(extent + 2.0 * moved * normal.abs());
+    // In a plane through the origin along the axes all of this is zero, and rays started in the plane would hit it at 0.
+    let least = SMALLEST_OFFSET * extent.max_element();
+    let distance = test_error(extent + 2.0 * moved * normal.abs()).max(least);
     (position, (rounding + distance * normal.abs()).as_vec3(), normal.as_vec3())
 }
 

@@ -1,0 +1,134 @@
+//! Direct light on patches by sampling the light sources.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::RadiosityScene;
+use super::patches::Patches;
+use super::shoot::side_normal;
+use crate::backend::Ray;
+use crate::lighting::shadow::{ShadowRay, light_visibility};
+use crate::sampling;
+
+/// Samples a side gets before it is known how much it varies.
+const PILOT: u32 = 8;
+/// Fewest and most samples a side.
+const SAMPLES: (u32, u32) = (4, 1024);
+/// Sides looked at by one job.
+const JOB: usize = 64;
+
+/// Direct light on all sides.
+pub(super) struct Direct {
+    /// Incident flux of each side, two independent estimates, W.
+    pub incident: [Vec<DVec3>; 2],
+    /// Relative error expected of their mean (flux-weighted, as [`Solution::error`](super::Solution::error)).
+    pub error: f64,
+    /// Shadow rays traced.
+    pub rays: u64,
+}
+
+/// Mean irradiance of a side and the variance of one sample, summed over bands.
+#[derive(Clone, Copy, Default)]
+struct Estimate {
+    mean: DVec3,
+    variance: f64,
+    rays: u64,
+}
+
+/// Gathers direct light with samples placed so that the mean of both estimates has the relative error `target`.
+///
+/// A pilot decides how many samples each side gets and is then forgotten: deciding by the samples that are used would
+/// bias the mean.
+pub(super) fn gather(input: &RadiosityScene<'_>, patches: &Patches, seed: u32, target: f64) -> Direct {
+    let sides = 2 * patches.len();
+    let area = |side: usize| patches.area[side / 2];
+    let stream = |what: u32| sampling::hash_all(&[seed, 0x00d1_9ec7, what]);
+    let pilot = estimate(input, patches, &vec![PILOT; sides], stream(2));
+    // Sum of standard errors is least for samples in proportion to (A sigma)^(2/3).
+    let spread: Vec<f64> = pilot.iter().enumerate().map(|(s, e)| area(s) * e.variance.sqrt()).collect();
+    let flux: f64 = pilot.iter().enumerate().map(|(s, e)| area(s) * e.mean.element_sum()).sum();
+    let weight: f64 = spread.iter().map(|x| x.cbrt().powi(2)).sum();
+    let per_weight = if flux > 0.0 { (weight / (target * flux)).powi(2) / 2.0 } else { 0.0 };
+    let counts: Vec<u32> = spread
+        .iter()
+        .map(|x| (per_weight * x.cbrt().powi(2)).ceil().clamp(SAMPLES.0.into(), SAMPLES.1.into()) as u32)
+        .map(u32::next_power_of_two)
+        .collect();
+    let expected: f64 = spread.iter().zip(&counts).map(|(x, &n)| x / f64::from(2 * n).sqrt()).sum();
+    let mut direct = Direct {
+        incident: [Vec::new(), Vec::new()],
+        error: if flux > 0.0 { expected / flux } else { 0.0 },
+        rays: pilot.iter().map(|e| e.rays).sum(),
+    };
+    for half in 0..2 {
+        let estimates = estimate(input, patches, &counts, stream(half));
+        direct.rays += estimates.iter().map(|e| e.rays).sum::<u64>();
+        direct.incident[half as usize] = estimates.iter().enumerate().map(|(s, e)| area(s) * e.mean).collect();
+    }
+    direct
+}
+
+/// Irradiance of every side from `counts` samples each.
+fn estimate(input: &RadiosityScene<'_>, patches: &Patches, counts: &[u32], stream: u32) -> Vec<Estimate> {
+    counts
+        .par_chunks(JOB)
+        .enumerate()
+        .flat_map_iter(|(job, counts)| {
+            let mut rays = Vec::new();
+            let mut values: Vec<(usize, DVec3)> = Vec::new();
+            for (k, &count) in counts.iter().enumerate() {
+                let side = (job * JOB + k) as u32;
+                for i in 0..count {
+                    if let Some((ray, value)) = sample(input, patches, side, i, stream) {
+                        rays.push(ray);
+                        values.push((k, value));
+                    }
+                }
+            }
+            let mut through = vec![glam::Vec3::ONE; rays.len()];
+            light_visibility(input.rays, input.scene, Some(&input.geometry.sources), &rays, &mut through);
+            let mut estimates = vec![Estimate::default(); counts.len()];
+            let mut squares = vec![0.0; counts.len()];
+            for ((k, value), seen) in values.into_iter().zip(through) {
+                let value = value * seen.as_dvec3();
+                estimates[k].mean += value;
+                estimates[k].rays += 1;
+                squares[k] += value.element_sum().powi(2);
+            }
+            for ((estimate, square), &count) in estimates.iter_mut().zip(squares).zip(counts) {
+                let n = f64::from(count);
+                estimate.mean /= n;
+                estimate.variance = (square / n - estimate.mean.element_sum().powi(2)).max(0.0) * n / (n - 1.0);
+            }
+            estimates
+        })
+        .collect()
+}
+
+/// A shadow ray and the irradiance it brings when nothing is in its way.
+fn sample(
+    input: &RadiosityScene<'_>,
+    patches: &Patches,
+    side: u32,
+    index: u32,
+    stream: u32,
+) -> Option<(ShadowRay, DVec3)> {
+    let stream = sampling::hash_all(&[stream, side]);
+    let s = sampling::sobol(index, 0, stream);
+    let choice = sampling::sobol(index, 1, stream)[0];
+    let point = patches.point(input.geometry, side / 2, [s[0], s[1]]);
+    let normal = side_normal(&point, side);
+    let light = input.lights.sample(input.scene, point.position, normal, [choice, s[2], s[3]])?;
+    let cos = light.direction.dot(normal);
+    if cos <= 0.0 || light.weight.max_element() <= 0.0 {
+        return None;
+    }
+    let ray = Ray {
+        origin: point.ray_origin(light.direction),
+        t_near: 0.0,
+        direction: light.direction,
+        t_far: light.distance,
+    };
+    let shadow = ShadowRay { ray, light: light.triangle };
+    Some((shadow, f64::from(cos) * light.weight.as_dvec3()))
+}

@@ -1,0 +1,280 @@
+//! Shooting: photons leave patches (or light sources), meet patches, and are reflected specularly on the way where a surface
+//! is a mirror or glass.
+
+use std::ops::Range;
+
+use glam::{DVec3, Vec2, Vec3};
+use rayon::prelude::*;
+
+use super::RadiosityScene;
+use super::ledger::Tally;
+use super::optics::{GLOSSY_THRESHOLD, Optics};
+use super::patches::Patches;
+use crate::backend::{Coherence, Hit, Ray, Visible};
+use crate::sampling;
+use crate::shading::{Bsdf, SurfacePoint};
+use crate::simplify::TriangleSource;
+
+/// Rays traced in one call of the backend.
+const CHUNK: u64 = 4096;
+/// Chunks whose deposits are kept until they are added up in order.
+const GROUP: u64 = 64;
+/// Specular reflections after which a photon is given up.
+const MAX_CHAIN: usize = 32;
+/// Weight under which photons go on only with proportional probability.
+const ROULETTE: f32 = 0.25;
+
+/// Barycentric distance from a triangle's edge within which a hit is not trusted: where a wall ends at a floor, the floor beyond the
+/// wall may be met at the same rounded distance as the wall.
+const EDGE: f32 = 1e-6;
+/// How far such a ray is turned before it is traced again, radians at most.
+const TURN: f32 = 1e-4;
+/// How often a ray is traced again.
+const RETRIES: u8 = 4;
+
+/// Light of one patch side that is shot with equal shares over a number of rays.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Shot {
+    /// The side.
+    pub side: u32,
+    /// Number of rays.
+    pub rays: u32,
+    /// Flux of each ray.
+    pub flux: DVec3,
+    /// Stream of low-discrepancy points.
+    pub stream: u32,
+}
+
+/// What a ray carries.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Load {
+    /// Flux, W.
+    pub flux: DVec3,
+    /// Number for random decisions.
+    pub id: u64,
+    /// Whether a mirror or a refracting surface has changed its course.
+    pub bent: bool,
+    /// How often it was traced again because it met an edge.
+    pub retries: u8,
+}
+
+impl Load {
+    /// A load that sets out.
+    pub fn new(flux: DVec3, id: u64) -> Self {
+        Load { flux, id, bent: false, retries: 0 }
+    }
+
+    /// Random numbers of its own, for step `depth` of its way.
+    fn random(&self, depth: u32) -> impl FnMut() -> f32 + use<> {
+        let mut key = sampling::hash_all(&[self.id as u32, (self.id >> 32) as u32, depth]);
+        move || {
+            key = sampling::hash(key.wrapping_add(0x9e37_79b9));
+            sampling::unit(key)
+        }
+    }
+
+    /// The ray and load for another try, when `hit` lies on an edge. Scaling the axes apart keeps a grazing ray above the
+    /// surface it left, for surfaces along the axes at least.
+    fn again(&self, ray: &Ray, hit: &Hit, depth: u32) -> Option<(Ray, Load)> {
+        let inside = hit.u.min(hit.v).min(1.0 - hit.u - hit.v);
+        if inside > EDGE || self.retries == RETRIES {
+            return None;
+        }
+        let mut random = self.random(depth);
+        let scale = Vec3::new(random(), random(), random()) * TURN + 1.0;
+        let ray = Ray { direction: (ray.direction * scale).normalize(), ..*ray };
+        Some((ray, Load { retries: self.retries + 1, ..*self }))
+    }
+}
+
+/// Rays and what they carry, index by index.
+#[derive(Default)]
+pub(super) struct Photons {
+    /// Rays.
+    pub rays: Vec<Ray>,
+    /// Loads.
+    pub loads: Vec<Load>,
+}
+
+impl Photons {
+    /// Adds a photon.
+    pub fn push(&mut self, ray: Ray, load: Load) {
+        self.rays.push(ray);
+        self.loads.push(load);
+    }
+
+    fn clear(&mut self) {
+        self.rays.clear();
+        self.loads.clear();
+    }
+}
+
+/// Which photons light the patches they meet.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Deposit {
+    /// All.
+    All,
+    /// Only those that were bent: the rest is known already.
+    Bent,
+}
+
+/// All that shooting needs.
+pub(super) struct Tracer<'a> {
+    /// The scene.
+    pub input: &'a RadiosityScene<'a>,
+    /// Its patches.
+    pub patches: &'a Patches,
+    /// How they reflect.
+    pub optics: &'a Optics,
+}
+
+#[derive(Default)]
+struct Scratch {
+    photons: Photons,
+    next: Photons,
+    hits: Vec<Hit>,
+}
+
+#[derive(Default)]
+struct Output {
+    deposits: Vec<(u32, DVec3)>,
+    tally: Tally,
+}
+
+/// Unit geometric normal of `side` at a point of its patch.
+pub(super) fn side_normal(point: &SurfacePoint, side: u32) -> Vec3 {
+    if side.is_multiple_of(2) { point.geometric_normal } else { -point.geometric_normal }
+}
+
+impl Tracer<'_> {
+    /// Shoots `shots` and adds the flux that arrives to `incident`, one entry a side.
+    pub fn shoot(&self, shots: &[Shot], incident: &mut [DVec3]) -> Tally {
+        let mut ends = Vec::with_capacity(shots.len());
+        let mut total = 0;
+        for shot in shots {
+            total += u64::from(shot.rays);
+            ends.push(total);
+        }
+        let geometry = self.input.geometry;
+        let emit = |range: Range<u64>, photons: &mut Photons| {
+            let mut at = ends.partition_point(|&end| end <= range.start);
+            for k in range {
+                while ends[at] <= k {
+                    at += 1;
+                }
+                let shot = &shots[at];
+                let index = u64::from(shot.rays) - (ends[at] - k);
+                let s = sampling::sobol(index as u32, 0, shot.stream);
+                let point = self.patches.point(geometry, shot.side / 2, [s[0], s[1]]);
+                let local = sampling::cosine_hemisphere(Vec2::new(s[2], s[3]));
+                let direction = sampling::basis(side_normal(&point, shot.side)) * local;
+                let id = u64::from(shot.stream) << 32 | index;
+                photons.push(Ray::new(point.ray_origin(direction), direction), Load::new(shot.flux, id));
+            }
+        };
+        self.trace(total, &emit, Deposit::All, incident)
+    }
+
+    /// Traces the photons `0..count`, which `emit` makes, and adds what arrives to `incident`. The result does not depend on the
+    /// number of threads: chunks have a fixed size and are added up in order.
+    pub fn trace(
+        &self,
+        count: u64,
+        emit: &(impl Fn(Range<u64>, &mut Photons) + Sync),
+        deposit: Deposit,
+        incident: &mut [DVec3],
+    ) -> Tally {
+        let mut tally = Tally::default();
+        let chunks = count.div_ceil(CHUNK);
+        for group in (0..chunks).step_by(GROUP as usize) {
+            let outputs: Vec<Output> = (group..(group + GROUP).min(chunks))
+                .into_par_iter()
+                .map_init(Scratch::default, |scratch, chunk| {
+                    scratch.photons.clear();
+                    emit(chunk * CHUNK..((chunk + 1) * CHUNK).min(count), &mut scratch.photons);
+                    self.follow(scratch, deposit)
+                })
+                .collect();
+            for output in outputs {
+                for (side, flux) in output.deposits {
+                    incident[side as usize] += flux;
+                }
+                tally.add(&output.tally);
+            }
+        }
+        tally
+    }
+
+    fn follow(&self, scratch: &mut Scratch, deposit: Deposit) -> Output {
+        let Scratch { photons, next, hits } = scratch;
+        let mut output = Output { deposits: Vec::with_capacity(photons.rays.len()), tally: Tally::default() };
+        for depth in 0..MAX_CHAIN {
+            if photons.rays.is_empty() {
+                return output;
+            }
+            hits.resize(photons.rays.len(), Hit::MISS);
+            self.input.rays.closest(&photons.rays, Visible::All, Coherence::Incoherent, hits);
+            output.tally.rays += photons.rays.len() as u64;
+            next.clear();
+            for ((ray, load), hit) in photons.rays.iter().zip(&photons.loads).zip(hits.iter()) {
+                let counts = deposit == Deposit::All || load.bent;
+                if !hit.is_hit() {
+                    if counts {
+                        output.tally.escaped += load.flux;
+                    }
+                    continue;
+                }
+                if let Some((ray, load)) = load.again(ray, hit, depth as u32) {
+                    next.push(ray, load);
+                    continue;
+                }
+                let patch = self.patches.map.at(hit.triangle, hit.u, hit.v);
+                if counts {
+                    let front = ray.direction.dot(self.patches.normals[hit.triangle as usize]) < 0.0;
+                    output.deposits.push((2 * patch + u32::from(!front), load.flux));
+                }
+                if self.optics.specular[patch as usize]
+                    && let Some((ray, load)) = self.pass_on(patch, hit, ray.direction, load, depth as u32)
+                {
+                    if deposit == Deposit::All || load.bent {
+                        output.tally.passed_on += load.flux;
+                    }
+                    next.push(ray, load);
+                }
+            }
+            std::mem::swap(photons, next);
+        }
+        output.tally.lost = photons.loads.iter().map(|l| l.flux).sum();
+        photons.clear();
+        output
+    }
+
+    /// How a photon goes on from a mirror, glass or a pane.
+    fn pass_on(&self, patch: u32, hit: &Hit, direction: Vec3, load: &Load, depth: u32) -> Option<(Ray, Load)> {
+        let TriangleSource::Scene { triangle } = self.input.geometry.sources[hit.triangle as usize] else {
+            return None;
+        };
+        let scene = self.input.scene;
+        let point = SurfacePoint::new(scene, &Hit { triangle, ..*hit });
+        let bsdf = Bsdf::new(scene, &point, -direction, GLOSSY_THRESHOLD);
+        let mut random = load.random(depth);
+        let sample = bsdf.sample_high([random(), random(), random()])?;
+        let material = &scene.materials[scene.mesh.object(triangle).material as usize];
+        let mut weight = sample.weight;
+        if sample.transmitted && !sample.straight && material.refracts {
+            // Flux, unlike radiance, does not change with the index of refraction (pbrt 4ed 9.5.2).
+            let squared = material.ior.max(1.0).powi(2);
+            let front = direction.dot(point.geometric_normal) < 0.0;
+            weight *= if front { squared } else { 1.0 / squared };
+        }
+        // What the patch takes for diffuse reflection cannot go on as well.
+        let weight = weight.min(Vec3::ONE - self.optics.reflectance[patch as usize]).max(Vec3::ZERO);
+        let survival = (weight.max_element() / ROULETTE).min(1.0);
+        if random() >= survival {
+            return None;
+        }
+        let flux = load.flux * (weight / survival).as_dvec3();
+        let load = Load { flux, bent: load.bent || !sample.straight, ..*load };
+        Some((Ray::new(point.ray_origin(sample.direction), sample.direction), load))
+    }
+}

@@ -1,0 +1,66 @@
+//! What [`solve`](super::solve) finds.
+
+use glam::Vec3;
+
+use super::ledger::Ledger;
+use super::patches::PatchMap;
+
+/// Radiosities of both sides of every patch, and the way from a hit to its patch.
+#[derive(Clone, Debug)]
+pub struct Solution {
+    pub(super) map: PatchMap,
+    pub(super) of_patch: Vec<PatchSolution>,
+    /// Energy balance.
+    pub ledger: Ledger,
+    /// Number of patches.
+    pub patches: usize,
+    /// Edge length of the patches, scene length units: the one asked for, or larger where that gave too many.
+    pub patch_size: f32,
+    /// Rays traced.
+    pub rays: u64,
+    /// Number of shots: times that a side shot its unshot flux.
+    pub shots: u64,
+    /// Relative standard error of the solution (flux-weighted mean over patches), from independent halves.
+    pub error: f32,
+    /// Sentences for the user.
+    pub warnings: Vec<String>,
+}
+
+/// The solution on one patch; front first.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct PatchSolution {
+    /// Radiosity without emission, W/m^2.
+    pub radiosity: [Vec3; 2],
+    /// Standard error of the mean over bands of `radiosity`.
+    pub deviation: [f32; 2],
+    /// Diameter.
+    pub diameter: f32,
+}
+
+impl Solution {
+    fn at(&self, triangle: u32, u: f32, v: f32) -> &PatchSolution {
+        &self.of_patch[self.map.at(triangle, u, v) as usize]
+    }
+
+    /// Radiosity minus emission (W/m^2) of the patch at barycentrics `u`, `v` of a triangle of the geometry, on its front
+    /// (counter-clockwise) or back side.
+    pub fn radiosity(&self, triangle: u32, u: f32, v: f32, front: bool) -> Vec3 {
+        self.at(triangle, u, v).radiosity[usize::from(!front)]
+    }
+
+    /// Standard error of the mean over bands of [`Solution::radiosity`], W/m^2: half the difference of two independent halves,
+    /// itself a random number with one degree of freedom.
+    pub fn deviation(&self, triangle: u32, u: f32, v: f32, front: bool) -> f32 {
+        self.at(triangle, u, v).deviation[usize::from(!front)]
+    }
+
+    /// Index of that patch, less than [`Solution::patches`].
+    pub fn patch(&self, triangle: u32, u: f32, v: f32) -> u32 {
+        self.map.at(triangle, u, v)
+    }
+
+    /// Diameter of that patch.
+    pub fn patch_diameter(&self, triangle: u32, u: f32, v: f32) -> f32 {
+        self.at(triangle, u, v).diameter
+    }
+}

@@ -1,0 +1,97 @@
+//! Light sources without area and gathered direct light.
+
+use std::f32::consts::PI;
+
+use glam::{DVec3, Vec3};
+
+use super::*;
+use crate::scene::LightKind;
+
+fn light(intensity: f32, kind: LightKind) -> PunctualLight {
+    PunctualLight { name: "light".to_owned(), intensity: Vec3::splat(intensity), kind }
+}
+
+#[test]
+fn hard_007_no_light() {
+    let room = closed_box([5.0, 4.0, 2.75], [0.5; 6], [0.0; 6]);
+    for direct in [DirectLight::Gather, DirectLight::Shoot] {
+        let solution = room.solve(&RadiosityParams { direct, ..RadiosityParams::new(0.25) }).unwrap();
+        assert_eq!((solution.shots, solution.rays, solution.error), (0, 0, 0.0));
+        assert_eq!(solution.ledger, Ledger::default());
+        assert_eq!(room.surface(&solution, 2).1, DVec3::ZERO);
+    }
+}
+
+#[test]
+fn hard_009_open_scene() {
+    let p = Vec3::new;
+    let square = [p(0., 0., 0.), p(1., 0., 0.), p(1., 1., 0.), p(0., 1., 0.)];
+    let sun = light(1.0, LightKind::Directional { direction: -Vec3::Z });
+    let room = Room::new(vec![(diced(square, 1), material(0.5, 0.0))], vec![sun]);
+    for direct in [DirectLight::Gather, DirectLight::Shoot] {
+        let params = RadiosityParams { direct, error: 1e-3, unshot: 1e-4, ..RadiosityParams::new(0.5) };
+        let solution = room.solve(&params).unwrap();
+        let (b, ledger) = (room.surface(&solution, 0).1.x, solution.ledger);
+        // Shot light meets each of four patches with a share of the rays, gathered light is exact.
+        assert_close("B", b, 0.5, if direct == DirectLight::Gather { 1e-3 } else { 4e-3 });
+        let missed = if direct == DirectLight::Gather { 0.0 } else { ledger.emitted[0] - b / 0.5 };
+        assert_close("escaped", ledger.escaped[0] - missed, b, 1e-3);
+    }
+}
+
+#[test]
+fn rad_015_area_mean_in_a_closed_room() {
+    for (rho, expected) in [(0.05, 5.482456), (0.5, 104.166667), (0.9, 937.5)] {
+        for direct in [DirectLight::Gather, DirectLight::Shoot] {
+            let lamp = light(10_000.0 / (4.0 * PI), LightKind::Point { position: Vec3::splat(2.0) });
+            let surfaces = box_faces([4.0; 3]).map(|face| (diced(face, 1), material(rho, 0.0)));
+            let room = Room::new(surfaces.into(), vec![lamp]);
+            let params = RadiosityParams { direct, error: 5e-3, unshot: 1e-3, seed: 2, ..RadiosityParams::new(0.5) };
+            let solution = room.solve(&params).unwrap();
+            let emitted = solution.ledger.emitted[0];
+            // B = rho (direct + indirect); the indirect part follows from the direct without further noise.
+            let indirect = mean_over_patches(&solution) / f64::from(rho) - emitted / 96.0;
+            assert_close(&format!("rho {rho}"), indirect, expected * emitted / 10_000.0, 1e-5);
+            assert_close("emitted", solution.ledger.emitted[0], 10_000.0, 3e-3);
+        }
+    }
+}
+
+#[test]
+fn gathered_and_shot_light_agree() {
+    let room = closed_box([1.0; 3], [0.7, 0.1, 0.5, 0.3, 0.2, 0.8], [0.0, 2.0, 0.0, 0.0, 0.0, 1.0]);
+    let solve = |direct| {
+        let params = RadiosityParams { direct, patch_size: 0.25, error: 5e-3, ..one_patch() };
+        room.solve(&params).unwrap()
+    };
+    let (shot, gathered) = (solve(DirectLight::Shoot), solve(DirectLight::Gather));
+    let (mut worst, mut sum, mut count) = (0.0_f64, 0.0, 0);
+    for t in 0..12 {
+        for (u, v) in [(0.1, 0.1), (0.7, 0.2), (0.15, 0.6), (0.4, 0.35)] {
+            let [a, b] = [&shot, &gathered].map(|s| f64::from(s.radiosity(t, u, v, true).x));
+            sum += (a / b - 1.0).powi(2);
+            worst = worst.max((a / b - 1.0).abs());
+            count += 1;
+        }
+    }
+    let rms = f64::sqrt(sum / f64::from(count));
+    println!("rms {rms:.1e}, worst {worst:.1e}");
+    // Both have a mean relative error of at most 5e-3; patches that get little light have more.
+    assert!(rms < 0.02);
+}
+
+#[test]
+fn same_result_with_any_number_of_threads() {
+    let room = closed_box([3.0, 2.0, 2.5], [0.7, 0.1, 0.5, 0.3, 0.2, 0.8], [0.0, 0.0, 0.0, 0.0, 0.0, 1.0]);
+    for direct in [DirectLight::Gather, DirectLight::Shoot] {
+        let params = RadiosityParams { direct, error: 0.05, ..RadiosityParams::new(0.3) };
+        let run = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let s = pool.install(|| room.solve(&params)).unwrap();
+            let of_patch: Vec<_> = s.of_patch.iter().map(|p| (p.radiosity, p.deviation)).collect();
+            (of_patch, s.ledger, s.rays, s.shots)
+        };
+        let one = run(1);
+        assert!(one == run(2) && one == run(5));
+    }
+}

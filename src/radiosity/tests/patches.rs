@@ -1,0 +1,105 @@
+//! How geometry is cut into patches.
+
+use glam::{Quat, Vec3};
+
+use super::*;
+
+fn cut(room: &Room, size: f64) -> Patches {
+    Patches::new(&room.geometry, &[], size, 100_000).unwrap()
+}
+
+#[test]
+fn hard_012_patches_do_not_depend_on_the_tessellation() {
+    let turn = Quat::from_euler(glam::EulerRot::XYZ, 0.3, 0.7, 1.1);
+    let wall = box_faces([3.0, 2.0, 1.0])[4].map(|p| turn * p);
+    let plain = cut(&Room::new(vec![(diced(wall, 1), material(0.5, 0.0))], Vec::new()), 0.25);
+    let fine = cut(&Room::new(vec![(diced(wall, 100), material(0.5, 0.0))], Vec::new()), 0.25);
+    for patches in [&plain, &fine] {
+        assert_eq!(patches.len(), 12 * 8);
+        for &area in &patches.area {
+            assert!((area - 0.0625).abs() < 1e-6, "{area}");
+        }
+    }
+}
+
+#[test]
+fn hard_012_diced_cube_has_the_same_radiosity() {
+    let exitance = [0.0, 0.0, 0.0, 0.0, 0.0, 1.0];
+    let cube = |n: u32| {
+        let faces = box_faces([1.0; 3]).into_iter().zip(exitance);
+        Room::new(faces.map(|(face, e)| (diced(face, n), material(0.5, e))).collect(), Vec::new())
+    };
+    for room in [cube(1), cube(100)] {
+        let params = RadiosityParams { patch_size: 1.0 / 15.0, error: 0.01, unshot: 1e-3, ..RadiosityParams::new(1.0) };
+        let solution = room.solve(&params).unwrap();
+        assert_eq!(solution.patches, 6 * 225);
+        // Irradiance at the floor centre (RAD-016); H = B / rho. A patch of 1/15 averages over a flat maximum.
+        let floor = &room.scene.mesh.objects[4].triangles;
+        let middle = floor.clone().find(|&t| {
+            let [a, b, c] = room.scene.mesh.corners(t);
+            let (e1, e2, d) = (b - a, c - a, Vec3::new(0.501, 0.5, 0.0) - a);
+            let det = e1.x * e2.y - e1.y * e2.x;
+            let (u, v) = ((d.x * e2.y - d.y * e2.x) / det, (e1.x * d.y - e1.y * d.x) / det);
+            u >= 0.0 && v >= 0.0 && u + v <= 1.0
+        });
+        let t = middle.unwrap();
+        let [a, b, c] = room.scene.mesh.corners(t);
+        let (e1, e2, d) = (b - a, c - a, Vec3::new(0.501, 0.5, 0.0) - a);
+        let det = e1.x * e2.y - e1.y * e2.x;
+        let (u, v) = ((d.x * e2.y - d.y * e2.x) / det, (e1.x * d.y - e1.y * d.x) / det);
+        let h = f64::from(solution.radiosity(t, u, v, true).x) / 0.5;
+        assert_close("H at the floor centre", h, 0.39520882, 0.01);
+    }
+}
+
+#[test]
+fn areas_add_up_and_points_lie_on_their_patch() {
+    // A bent strip, a sliver, a lone triangle far away.
+    let p = Vec3::new;
+    let strip: Vec<[Vec3; 3]> = (0..40)
+        .flat_map(|i| {
+            let at = |i: i32, z: f32| {
+                let (sin, cos) = (0.05 * i as f32).sin_cos();
+                p(3.0 * cos, 3.0 * sin, z)
+            };
+            [[at(i, 0.0), at(i + 1, 0.0), at(i + 1, 1.0)], [at(i, 0.0), at(i + 1, 1.0), at(i, 1.0)]]
+        })
+        .collect();
+    let sliver = vec![[p(0., 0., 0.), p(1., 0., 0.), p(0.5, 1e-6, 0.)]];
+    let far = vec![[p(1e4, 1e4, 0.), p(1e4 + 0.3, 1e4, 0.), p(1e4, 1e4 + 0.2, 0.1)]];
+    let room = Room::new([strip, sliver, far].map(|t| (t, material(0.5, 0.0))).into(), Vec::new());
+    let patches = cut(&room, 0.2);
+    let total: f64 = (0..room.geometry.triangles.len() as u32).map(|t| room.scene.mesh.area(t)).sum();
+    assert_close("area", patches.area.iter().sum(), total, 1e-9);
+    // 6 m along the arc and 1 m up in cells of 0.2; charts of 60 degrees cost a few more, joined edge cells some less.
+    assert!((120..240).contains(&patches.len()), "{}", patches.len());
+    let mut elsewhere = 0;
+    for patch in 0..patches.len() as u32 {
+        for i in 0..64 {
+            let s = sampling::sobol(i, 0, patch);
+            let (t, uv) = patches.sample(patch, [s[0], s[1]]);
+            elsewhere += u32::from(patches.map.at(t, uv.x, uv.y) != patch);
+        }
+    }
+    // Only points that rounding takes over a cell's edge.
+    assert!(elsewhere <= 2, "{elsewhere} points of {} lie on another patch", 64 * patches.len());
+}
+
+#[test]
+fn number_of_patches_is_bounded() {
+    let room = closed_box([1.0; 3], [0.5; 6], [0.0; 6]);
+    let patches = Patches::new(&room.geometry, &[], 1e-4, 1000).unwrap();
+    assert!((500..=1000).contains(&patches.len()), "{}", patches.len());
+    assert!(patches.size > 1e-4);
+}
+
+/// As many patches as the paper's N+C scene, which its authors could not finish.
+#[test]
+#[ignore = "takes a minute"]
+fn seventy_five_thousand_patches() {
+    let room = closed_box([5.0, 4.0, 2.75], [0.56; 6], [0.0, 0.0, 0.0, 1.0, 0.0, 0.0]);
+    let solution = room.solve(&RadiosityParams { error: 0.02, ..RadiosityParams::new(0.0345) }).unwrap();
+    assert!((70_000..80_000).contains(&solution.patches) && solution.error < 0.021);
+    let solution = room.solve(&RadiosityParams { error: 0.02, ..RadiosityParams::new(0.15) }).unwrap();
+    assert!(solution.error < 0.021);
+}
