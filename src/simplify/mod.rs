@@ -19,10 +19,10 @@ use glam::{Mat3, Vec3};
 
 pub use geometry::{SimplifiedGeometry, TriangleSource};
 
-use crate::backend::{HitFilter, RayBackend};
+use crate::backend::{HitFilter, PartKind, RayBackend};
 use crate::error::Result;
 use crate::progress::Progress;
-use crate::scene::{Aabb, Scene};
+use crate::scene::{Aabb, AlphaFilter, Scene};
 
 /// How a cluster's box is fitted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -152,7 +152,7 @@ pub struct Simplified {
 /// [`Error::Usage`](crate::error::Error::Usage) for parameters that make no sense;
 /// [`Error::Backend`](crate::error::Error::Backend) when the backend fails.
 pub fn simplify(
-    scene: &Scene,
+    scene: &Arc<Scene>,
     backend: &dyn RayBackend,
     params: &SimplifyParams,
     progress: &Progress,
@@ -241,7 +241,7 @@ fn drop_isolated(
 }
 
 /// The scene's filter for alpha-tested triangles, where it has any.
-pub(crate) fn scene_filter(scene: &Scene) -> Option<Arc<dyn HitFilter>> {
-    let _ = scene;
-    None
+fn scene_filter(scene: &Arc<Scene>) -> Option<Arc<dyn HitFilter>> {
+    let any = scene.mesh.objects.iter().any(|o| o.kind == PartKind::Filtered);
+    any.then(|| Arc::new(AlphaFilter::new(scene.clone())) as Arc<dyn HitFilter>)
 }

@@ -1,5 +1,7 @@
 //! Clusters become boxes.
 
+use std::sync::Arc;
+
 use glam::Mat3;
 use rayon::prelude::*;
 
@@ -43,7 +45,7 @@ struct Fitted {
 
 /// Fits a box to each group. `normal` is what may carry them.
 pub(super) fn replace(
-    scene: &Scene,
+    scene: &Arc<Scene>,
     backend: &dyn RayBackend,
     params: &SimplifyParams,
     groups: &[Group],

@@ -8,6 +8,7 @@
 //! (p-theory of plant canopies).
 
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 use glam::{DVec3, Mat3, Vec3};
 
@@ -123,7 +124,7 @@ impl FluxFit {
 /// # Errors
 /// When the backend fails.
 pub fn fit_flux(
-    scene: &Scene,
+    scene: &Arc<Scene>,
     backend: &dyn RayBackend,
     triangles: &[u32],
     axes: Mat3,

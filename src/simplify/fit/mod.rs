@@ -90,7 +90,7 @@ impl Stage {
     }
 
     /// Builds the acceleration structure.
-    pub(crate) fn build(&self, scene: &Scene, backend: &dyn RayBackend) -> Result<Box<dyn RayScene>> {
+    pub(crate) fn build(&self, scene: &Arc<Scene>, backend: &dyn RayBackend) -> Result<Box<dyn RayScene>> {
         let filtered = self.parts.iter().any(|p| p.kind == PartKind::Filtered);
         let filter = if filtered { super::scene_filter(scene) } else { None };
         backend.build(&TriangleSet {

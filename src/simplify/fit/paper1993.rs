@@ -5,6 +5,8 @@
 //! see the same silhouette, so their fractions are averaged. A length can come out as zero (plates without thickness, GSII-007;
 //! a diagonal sheet, GSII-008); [`PaperFit::lengths`] says so, the box itself gets a least thickness.
 
+use std::sync::Arc;
+
 use glam::{DVec3, Mat3, Vec2, Vec3};
 
 use super::{LEAST_THICKNESS, MARGIN, Probe, Stage, face_axes, frame_along, patch_index};
@@ -93,7 +95,7 @@ impl PaperFit {
 /// # Errors
 /// When the backend fails.
 pub fn fit_paper1993(
-    scene: &Scene,
+    scene: &Arc<Scene>,
     backend: &dyn RayBackend,
     triangles: &[u32],
     axes: Mat3,
