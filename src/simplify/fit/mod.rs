@@ -10,6 +10,8 @@ pub mod flux;
 pub mod lines;
 pub mod paper1993;
 pub mod residual;
+#[cfg(test)]
+mod paper_tests;
 
 use std::sync::Arc;
 
