@@ -178,3 +178,57 @@ pub fn compare_halves(halves: [&Image; 2], image: &Image) -> Result<CrossMetrics
         non_finite: image.pixels() - pixels.len(),
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+    use crate::sampling::{hash_all, unit};
+
+    fn image(width: u32, values: &[Vec3]) -> Image {
+        let mut image = Image::new(width, values.len() as u32 / width);
+        image.push_rgb("", values);
+        image
+    }
+
+    #[test]
+    fn known_differences() {
+        let reference = image(2, &[Vec3::ONE, Vec3::ONE, Vec3::ONE, Vec3::splat(f32::NAN)]);
+        let same = compare(&reference, &reference).unwrap();
+        assert_eq!((same.mse, same.rel_mse, same.psnr_db, same.non_finite_reference), (0.0, 0.0, None, 1));
+        let other = image(2, &[Vec3::ONE, Vec3::new(1.5, 1.0, 0.75), Vec3::ONE, Vec3::ONE]);
+        let metrics = compare(&reference, &other).unwrap();
+        let squares = 0.25 + 0.0625;
+        let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-14, "{a} is not {b}");
+        close(metrics.mse, squares / 9.0);
+        close(metrics.rmse, (squares / 9.0).sqrt());
+        close(metrics.rel_mse, squares / 9.0 / 1.01);
+        close(metrics.mean_relative_error, 0.75 / 9.0 / 1.01);
+        close(metrics.relative_bias[0], 0.5 / 3.0);
+        close(metrics.relative_bias[1], 0.0);
+        close(metrics.relative_bias[2], -0.25 / 3.0);
+        close(metrics.psnr_db.unwrap(), -10.0 * (squares / 9.0).log10());
+        assert_eq!((metrics.max_difference, metrics.max_difference_at), (0.5, [1, 0]));
+        assert_eq!((metrics.non_finite_image, metrics.non_finite_reference), (0, 1));
+        assert!(compare(&reference, &image(1, &[Vec3::ONE])).is_err());
+        let black = image(1, &[Vec3::ZERO]);
+        assert_eq!(compare(&black, &black).unwrap().rel_mse, 0.0);
+        assert_eq!(compare(&black, &image(1, &[Vec3::ONE])).unwrap().rel_mse, f64::INFINITY);
+    }
+
+    #[test]
+    fn halves_cancel_the_noise_of_the_reference() {
+        let noise = |salt: u32| {
+            let value = |i: u32| Vec3::from_array([0, 1, 2].map(|band| 1.0 + unit(hash_all(&[i, salt, band])) - 0.5));
+            image(64, &(0..4096).map(value).collect::<Vec<_>>())
+        };
+        let exact = image(64, &[Vec3::splat(1.1); 4096]);
+        let metrics = compare_halves([&noise(1), &noise(2)], &exact).unwrap();
+        // The truth is 1, so the squared error is 0.01; 4 standard errors fail falsely once in 16000 (fixed numbers).
+        assert!((metrics.mse - 0.01).abs() < 4.0 * metrics.mse_standard_error, "{metrics:?}");
+        // Product (0.1 - u)(0.1 - v) of uniform u, v: variance 2 * 0.01 / 12 + 1 / 144, over 3 bands and 4096 pixels.
+        let expected = ((0.02f64 / 12.0 + 1.0 / 144.0) / (3.0 * 4096.0)).sqrt();
+        assert!((metrics.mse_standard_error / expected - 1.0).abs() < 0.1);
+    }
+}

@@ -1,5 +1,7 @@
 //! Decoding the images of a scene file, which may lie in memory.
 
+use std::io::Write;
+
 use super::oiio::{Attempt, Reader};
 
 /// A decoded texture: RGBA whatever the file holds.
@@ -31,7 +33,20 @@ pub fn decode_texture(name: &str, bytes: &[u8]) -> std::result::Result<Pixels, S
     if bytes.is_empty() {
         return Err("the image is empty".to_owned());
     }
-    let mut reader = Reader::from_memory(&format!("memory.{}", format_of(name, bytes)), bytes)?;
+    let suffix = format!(".{}", format_of(name, bytes));
+    // Not every format is read from memory (WebP and Netpbm are not in 2.4).
+    let mut spilled = tempfile::Builder::new();
+    let _file;
+    let mut reader = match Reader::from_memory(&format!("memory{suffix}"), bytes) {
+        Ok(reader) => reader,
+        Err(_) => {
+            let mut file = spilled.suffix(&suffix).tempfile().map_err(|error| error.to_string())?;
+            file.write_all(bytes).and_then(|()| file.flush()).map_err(|error| error.to_string())?;
+            let reader = Reader::open(file.path())?;
+            _file = file; // removed after the reader is done
+            reader
+        }
+    };
     let (width, height) = (reader.width(), reader.height());
     let floating_point = reader.is_floating();
     let data = if reader.is_8_bit() && !floating_point {

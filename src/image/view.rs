@@ -9,7 +9,7 @@ pub enum ViewTransform {
     Srgb,
     /// AgX by Troy Sobotka (2022), with Benjamin Wrensch's polynomial for its sigmoid ("Minimal AgX Implementation",
     /// 2023): 16.5 stops from 2^-12.47 to 2^4.03, 10 below mid-grey and 6.5 above, colours bleached towards the top
-    /// instead of turning to the primaries.
+    /// instead of turning to the primaries. Mid-grey, 0.18, is shown at half of the encoded range (0.21 linear).
     #[default]
     Filmic,
 }
@@ -55,8 +55,9 @@ fn agx_curve(value: f32) -> f32 {
     polynomial.into_iter().fold(0.0, |sum, coefficient| sum * x + coefficient)
 }
 
+/// Weighted means: the published rows sum to 1 only within 2e-4, which would tint greys.
 fn multiply(matrix: &[[f32; 3]; 3], v: [f32; 3]) -> [f32; 3] {
-    matrix.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2])
+    matrix.map(|row| (row[0] * v[0] + row[1] * v[1] + row[2] * v[2]) / (row[0] + row[1] + row[2]))
 }
 
 /// Linear 0..1 to sRGB-encoded 0..1 (IEC 61966-2-1).
@@ -95,4 +96,65 @@ pub fn auto_exposure(image: &Image) -> f32 {
     }
     let mean = kept.iter().sum::<f64>() / kept.len() as f64;
     (0.18f64.log2() - mean) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const VIEWS: [ViewTransform; 2] = [ViewTransform::Srgb, ViewTransform::Filmic];
+
+    #[test]
+    fn greys_rise_from_black_to_white_and_stay_grey() {
+        for view in VIEWS {
+            assert_eq!(view.encode([0.0; 3]), [0.0; 3]);
+            let mut last = 0.0;
+            // 2^-14 to 2^6 in steps of a hundredth of a stop.
+            for step in 0..2000 {
+                let encoded = view.encode([(step as f32 / 100.0 - 14.0).exp2(); 3]);
+                // Greys meet equal weights, so only rounding tells the bands apart: some ten operations on values up
+                // to 40 (the polynomial's coefficients), 6e-8 each.
+                assert!(encoded.iter().all(|band| (band - encoded[0]).abs() < 2.4e-5), "{view:?} {encoded:?}");
+                assert!(encoded[0] >= last - 1e-6, "{view:?} falls at step {step}: {last} to {}", encoded[0]);
+                last = encoded[0];
+            }
+            assert!(last > 0.98, "{view:?} reaches only {last}");
+        }
+        // AgX puts mid-grey at half of the encoded range; the polynomial's root mean square error is published as 1.9e-3.
+        let mid = ViewTransform::Filmic.encode([0.18; 3])[0];
+        assert!((mid - 0.5).abs() < 3.0 * 1.9e-3, "0.18 becomes {mid}");
+    }
+
+    #[test]
+    fn whatever_comes_in_stays_in_range() {
+        let odd = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1.0, 0.0, 1e-40, 1e-3, 0.5, 20.0, f32::MAX];
+        for view in VIEWS {
+            for (r, g, b) in odd.iter().flat_map(|&r| odd.iter().flat_map(move |&g| odd.map(|b| (r, g, b)))) {
+                let encoded = view.encode([r, g, b]);
+                assert!(encoded.iter().all(|v| (0.0..=1.0).contains(v)), "{view:?} {r} {g} {b}: {encoded:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn srgb_and_back() {
+        for byte in 0..=255u8 {
+            let value = f32::from(byte) / 255.0;
+            assert_eq!((srgb_encode(srgb_decode(value)) * 255.0).round() as u8, byte);
+        }
+    }
+
+    #[test]
+    fn exposure_brings_the_middle_to_grey_despite_lamps_and_black() {
+        let mut image = Image::new(100, 1);
+        let mut values = vec![glam::Vec3::splat(0.045); 100];
+        (values[3], values[50], values[51], values[70]) =
+            (glam::Vec3::splat(1e6), glam::Vec3::ZERO, glam::Vec3::splat(f32::NAN), glam::Vec3::splat(1e5));
+        image.push_rgb("", &values);
+        // Single precision of log2.
+        assert!((auto_exposure(&image) - 2.0).abs() < 1e-5);
+        let mut black = Image::new(2, 2);
+        black.push_rgb("", &[glam::Vec3::ZERO; 4]);
+        assert_eq!(auto_exposure(&black), 0.0);
+    }
 }

@@ -4,6 +4,8 @@
 #include <OpenImageIO/imageio.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <cstdio>
 #include <cstring>
 #include <exception>
 #include <limits>
@@ -89,6 +91,20 @@ size_t times(size_t a, size_t b)
     return a * b;
 }
 
+void write_bytes(const char* path, const std::vector<unsigned char>& bytes)
+{
+    FILE* file = Filesystem::fopen(path, "wb");
+    if (!file)
+        throw std::runtime_error(std::strerror(errno));
+    errno = 0;
+    bool written = std::fwrite(bytes.data(), 1, bytes.size(), file) == bytes.size();
+    int reason = errno;
+    // The rest of the buffer goes out here.
+    bool closed = std::fclose(file) == 0;
+    if (!written || !closed)
+        throw std::runtime_error(std::strerror(written ? errno : reason));
+}
+
 bool floating(TypeDesc type) { return type.is_floating_point(); }
 
 } // namespace
@@ -140,6 +156,12 @@ GsiiReader* gsii_oiio_open(const char* path, const void* memory, size_t size, Gs
         // Colours stay as stored, not multiplied by alpha.
         hints.attribute("oiio:UnassociatedAlpha", 1);
         if (memory) {
+            // Without this check the plugin would look for a file of that name.
+            auto plugin = ImageInput::create(path);
+            if (!plugin || !plugin->supports("ioproxy")) {
+                (void)OIIO::geterror();
+                throw std::runtime_error("this format is not read from memory");
+            }
             reader->memory = std::make_unique<Filesystem::IOMemReader>(memory, size);
         }
         reader->input = ImageInput::open(path, &hints, reader->memory.get());
@@ -221,6 +243,7 @@ int gsii_oiio_write(const GsiiImage* image, char* error, size_t error_size)
 {
     return guarded(error, error_size, [&] {
         const int channels = image->channels;
+        Filesystem::IOVecOutput memory; // outlives `output`, which writes to it
         auto output = ImageOutput::create(image->path);
         if (!output)
             fail(output, "OpenImageIO knows no such format");
@@ -267,6 +290,9 @@ int gsii_oiio_write(const GsiiImage* image, char* error, size_t error_size)
                 offset += spec.channelformats[c].size();
             }
         }
+        // On a full disk OpenEXR and PNG report success and libjpeg ends the process (seen with 2.4.7), so the file is
+        // made in memory where the format can do that.
+        const bool in_memory = output->supports("ioproxy") && output->set_ioproxy(&memory);
         output->threads(OIIO::get_int_attribute("threads"));
         if (!output->open(image->path, spec))
             fail(output, "the file cannot be created");
@@ -277,6 +303,18 @@ int gsii_oiio_write(const GsiiImage* image, char* error, size_t error_size)
         // Some formats write everything here.
         if (!output->close())
             fail(output, "the file cannot be completed");
+        output.reset();
+        if (in_memory) {
+            write_bytes(image->path, memory.buffer());
+            return;
+        }
+        // The other formats do not tell either; what cannot be read again was not written.
+        auto input = ImageInput::open(image->path);
+        std::vector<unsigned char> values;
+        if (input)
+            values.resize(times(input->spec().image_pixels(), input->spec().pixel_bytes(true)));
+        if (!input || !input->read_image(0, 0, 0, input->spec().nchannels, TypeDesc::UNKNOWN, values.data()))
+            fail(input, "the file that was written cannot be read");
     });
 }
 
