@@ -6,8 +6,8 @@ pub mod dropped;
 pub mod fit;
 pub mod geometry;
 mod replace;
-pub mod surfaces;
 mod support;
+pub mod surfaces;
 #[cfg(test)]
 mod testing;
 #[cfg(test)]
@@ -70,7 +70,7 @@ pub struct Surface {
 /// What becomes of a surface in the simplified scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Class {
-    /// Large enough (or a light source, mirror or glass): in both scenes.
+    /// Large enough (or a light source, mirror or glass, or too few triangles for a box to be simpler): in both scenes.
     Normal,
     /// Small: only in the detailed scene, replaced by the box of this cluster, or by nothing when isolated.
     Complex {
@@ -173,6 +173,7 @@ pub fn simplify(
                 "{kept_long} surfaces have less area than A_thresh = {a_thresh:.3e} but are longer than {limit:.3e} and stay normal"
             ));
         }
+        groups.retain(|g| worth_a_box(g, &surfaces));
         for (cluster, group) in (0u32..).zip(&groups) {
             for &s in &group.surfaces {
                 surfaces[s as usize].class = Class::Complex { cluster: Some(cluster) };
@@ -202,6 +203,11 @@ fn is_used(scene: &Scene, r_thresh: f32) -> bool {
     r_thresh > 0.0 && r_thresh <= 2.0 * scene.mesh.bounds.diagonal()
 }
 
+/// Whether a box is simpler than what it replaces. A few quads are not worth one: they stay as they are, which is exact.
+fn worth_a_box(group: &cluster::Group, surfaces: &[Surface]) -> bool {
+    group.surfaces.iter().map(|&s| surfaces[s as usize].triangles).sum::<u32>() > geometry::BOX_TRIANGLES
+}
+
 /// Takes the groups that are dropped out of `groups` and marks their surfaces. Returns how many surfaces had to stay normal
 /// because they are too long for a cluster.
 fn drop_isolated(
@@ -216,8 +222,7 @@ fn drop_isolated(
         let surface: &Surface = &surfaces[s as usize];
         dropped::Candidate { centre: surface.bounds.centre(), area: surface.area }
     };
-    let candidates: Vec<_> =
-        groups.iter().map(of_group).chain(small.long_isolated.iter().map(of_surface)).collect();
+    let candidates: Vec<_> = groups.iter().map(of_group).chain(small.long_isolated.iter().map(of_surface)).collect();
     let is_dropped = dropped::choose_dropped(&candidates, a_thresh, r_thresh);
     let (of_groups, of_long) = is_dropped.split_at(groups.len());
     let gone = Class::Complex { cluster: None };

@@ -57,7 +57,7 @@ fn gsii_001_threshold_is_strict_and_counts_surfaces() {
 
 #[test]
 fn gsii_002_office_setting() {
-    assert!((area_threshold(0.318, PAPER_BETA) / 0.101124 - 1.0).abs() < 1e-6);
+    assert!((area_threshold(0.053 * 6.0, PAPER_BETA) / 0.101124 - 1.0).abs() < 1e-6);
 }
 
 #[test]
@@ -131,10 +131,11 @@ fn light_sources_mirrors_and_glass_are_never_simplified() {
     }
     let scene = Arc::new(builder.build());
     // A small beta, so that nothing is dropped by A_thresh that a cluster should hold.
-    let s = run(&scene, &params(0.3, 1e-3));
+    let s = run(&scene, &params(0.3, 1e-4));
     for surface in &s.surfaces[6..] {
         let lambertian = scene.materials[scene.mesh.objects[surface.object as usize].material as usize].is_lambertian();
-        let expected = lambertian && !scene.materials[scene.mesh.objects[surface.object as usize].material as usize].is_emitter();
+        let expected =
+            lambertian && !scene.materials[scene.mesh.objects[surface.object as usize].material as usize].is_emitter();
         assert_eq!(surface.class != Class::Normal, expected);
     }
     assert!(!s.clusters.is_empty());
@@ -175,7 +176,8 @@ fn clusters_respect_the_cap_and_dropped_areas_their_bound() {
         assert!(cluster.surfaces.iter().all(|&m| s.surfaces[m as usize].class == Class::Complex { cluster: Some(i) }));
     }
     let listed: usize = s.clusters.iter().map(|c| c.surfaces.len()).sum();
-    assert_eq!(listed + dropped.len() + 6, s.surfaces.len());
+    let normal = is_normal(&s).into_iter().filter(|&n| n).count();
+    assert_eq!(listed + dropped.len() + normal, s.surfaces.len());
 }
 
 #[test]
@@ -192,7 +194,7 @@ fn same_result_whatever_the_number_of_threads() {
 #[test]
 fn geometry_is_consistent_and_boxes_face_outward() {
     let scene = Arc::new(room(2, 0.5).grey(0.5, &leaves(300, 0.01, Vec3::splat(0.3), Vec3::splat(0.6), 5)).build());
-    let s = run(&scene, &params(0.3, 1e-4));
+    let s = run(&scene, &params(0.3, 1e-3));
     let g = &s.geometry;
     assert!(!s.clusters.is_empty());
     assert_eq!(g.triangles.len(), 48 + 12 * s.clusters.len());
@@ -205,7 +207,7 @@ fn geometry_is_consistent_and_boxes_face_outward() {
             TriangleSource::Scene { triangle } => assert_eq!([a, b, c], scene.mesh.corners(triangle)),
             TriangleSource::BoxFace { cluster, face, second } => {
                 let shape = &s.clusters[cluster as usize].equivalent_box;
-                let outward = shape.axes.col(face as usize / 2) * if face % 2 == 0 { -1.0 } else { 1.0 };
+                let outward = shape.axes.col(face as usize / 2) * fit::face_side(face.into());
                 assert!((b - a).cross(c - a).normalize().dot(outward) > 0.999);
                 // Corner (0,0), and the corner that tells the halves apart: (1,0) or (0,1).
                 let local = |p: Vec3| shape.axes.transpose() * (p - shape.centre) / shape.half;
@@ -222,20 +224,39 @@ fn geometry_is_consistent_and_boxes_face_outward() {
 
 #[test]
 fn boxes_stay_on_the_floor() {
-    // Sparse rods standing on the floor of the room.
+    // Loose layers of scraps, the lowest on the floor.
     let mut builder = room(1, 0.5);
-    for k in 0..25 {
-        let (x, z) = (0.4 + 0.04 * (k % 5) as f32, 0.4 + 0.04 * (k / 5) as f32);
-        builder = builder.grey(0.5, &solid([x, 0.0, z], [x + 0.008, 0.1, z + 0.008]));
+    for k in 0..500 {
+        let [x, z, ..] = sampling::sobol(k, 0, 4);
+        let corner = Vec3::new(0.4 + 0.1 * x, 0.0005 + 0.01 * (k % 10) as f32, 0.4 + 0.1 * z);
+        builder = builder.grey(0.5, &quad(corner, Vec3::X * 0.004, Vec3::Z * 0.004));
     }
-    let s = run(&Arc::new(builder.build()), &params(0.4, 1e-3));
+    let s = run(&Arc::new(builder.build()), &params(0.4, 1e-4));
     assert!(!s.clusters.is_empty());
-    for cluster in &s.clusters {
+    for cluster in s.clusters.iter().filter(|c| c.bounds.min.y < 0.001) {
         let shape = &cluster.equivalent_box;
-        assert!(shape.half.y < 0.05);
-        let bottom = shape.centre.y - shape.half.y;
+        let half_height = shape.axes.row(1).abs().dot(shape.half);
+        assert!(half_height < 0.9 * 0.5 * cluster.bounds.size().y, "lower than its cluster, or nothing is shown");
+        let bottom = shape.centre.y - half_height;
         assert!(bottom > 0.0 && bottom < 0.001, "{bottom}");
     }
+}
+
+#[test]
+fn a_box_never_replaces_something_simpler() {
+    // Six quads have the twelve triangles of a box; a seventh makes the box worth it. None can be dropped.
+    let with = |n: u32| {
+        let quads: Vec<_> = (0..n)
+            .flat_map(|k| quad(Vec3::new(0.4 + 0.011 * k as f32, 0.4, 0.4), Vec3::X * 0.01, Vec3::Y * 0.01))
+            .collect();
+        let s = run(&Arc::new(room(1, 0.5).grey(0.5, &quads).build()), &params(0.2, 4.1e-4));
+        assert!(
+            s.surfaces[6].area < s.a_thresh && s.surfaces.iter().all(|s| s.class != Class::Complex { cluster: None })
+        );
+        (s.clusters.len(), s.geometry.triangles.len())
+    };
+    assert_eq!(with(6), (0, 12 + 12));
+    assert_eq!(with(7), (1, 12 + 12));
 }
 
 /// Mean projected area of the cluster over that of the fitted box, minus 1, and three standard errors, on lines that the fit
@@ -289,10 +310,7 @@ fn escape_albedo_of_a_convex_body_is_its_reflectance() {
 #[test]
 fn gsii_018_escape_albedo_of_a_bowl() {
     // Hemisphere, inside reflectance 0.8: the opening reflects 2/3; the paper's patch says 0.8.
-    let bowl: Vec<_> = sphere(Vec3::ZERO, 1.0, 24)
-        .into_iter()
-        .filter(|t| t.iter().all(|p| p.y <= 1e-6))
-        .collect();
+    let bowl: Vec<_> = sphere(Vec3::ZERO, 1.0, 24).into_iter().filter(|t| t.iter().all(|p| p.y <= 1e-6)).collect();
     let scene = Arc::new(SceneBuilder::default().grey(0.8, &bowl).build());
     let all = all_triangles(&scene);
     let paper = fit_paper1993(&scene, &BruteForce, &all, Mat3::IDENTITY, 1, 16, 1).unwrap();

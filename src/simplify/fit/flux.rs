@@ -109,9 +109,10 @@ impl FluxFit {
     /// The box for a cluster with bounding-box edges `size`, of which `tally` was measured.
     pub(crate) fn new(size: Vec3, tally: &LineTally) -> Self {
         let edges = box_edges(size, tally);
-        let measured = tally.patches.each_ref().map(|face| {
-            face.iter().map(|&(hits, sum)| (hits > 0).then(|| sum / hits as f32)).collect::<Vec<_>>()
-        });
+        let measured = tally
+            .patches
+            .each_ref()
+            .map(|face| face.iter().map(|&(hits, sum)| (hits > 0).then(|| sum / hits as f32)).collect::<Vec<_>>());
         let albedo = tally.albedo();
         let mut reflectance = fill_patches(&measured, albedo);
         match_mean(&mut reflectance, edges, albedo);

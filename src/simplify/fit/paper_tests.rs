@@ -91,7 +91,8 @@ fn gsii_009_and_019_sphere() {
     let fit = fit(SceneBuilder::default().grey(0.0, &sphere(Vec3::ZERO, 0.5, 32)), 1, 64);
     let f = std::f64::consts::FRAC_PI_4;
     assert_fit(&fit, [f; 3], [f; 3], 0.005, 0.01);
-    let box_area = 2.0 * (fit.lengths.x * fit.lengths.y + fit.lengths.y * fit.lengths.z + fit.lengths.z * fit.lengths.x);
+    let box_area =
+        2.0 * (fit.lengths.x * fit.lengths.y + fit.lengths.y * fit.lengths.z + fit.lengths.z * fit.lengths.x);
     let interception = box_area / std::f64::consts::PI;
     assert!(near(interception / 1.1780972450961724, 1.0, 0.02), "{interception}");
     // GSII-019: black body of area A in a spherical room of radius 2, E = 1, rho = 0.8: B = E / (1 - rho F(wall, wall)).
@@ -143,7 +144,7 @@ fn gsii_016_patch_that_nothing_hits() {
 
 #[test]
 fn gsii_017_checkerboard_keeps_its_colours() {
-    let rho = |i: usize, j: usize| if (i + j) % 2 == 0 { 0.8 } else { 0.2 };
+    let rho = |i: usize, j: usize| if (i + j).is_multiple_of(2) { 0.8 } else { 0.2 };
     let builder = (0..16).fold(SceneBuilder::default(), |b, k| {
         let (x, y) = ((k / 4) as f32 * 0.25, (k % 4) as f32 * 0.25);
         b.grey(rho(k / 4, k % 4), &solid([x, y, 0.0], [x + 0.25, y + 0.25, 1.0]))
