@@ -7,9 +7,11 @@
 //! ([`render`]) and written ([`image`]); ray queries of every stage go through [`backend`].
 
 pub mod backend;
+pub mod cli;
 pub mod error;
 pub mod image;
 pub mod lighting;
+pub mod pipeline;
 pub mod progress;
 pub mod radiosity;
 pub mod render;

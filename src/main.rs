@@ -1,1 +1,7 @@
-fn main() {}
+//! `gsii`: see `gsii --help`.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    gsii::cli::run()
+}

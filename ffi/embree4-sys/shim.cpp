@@ -72,16 +72,6 @@ bool usable(const gsii_embree_ray* ray) {
     return zero == 0.0f && directed && ray->t_far >= ray->t_near;
 }
 
-/* Embree's interval is open at t_near, ours is closed. */
-float open_near(float t_near) {
-    if (!(t_near > 0.0f)) return 0.0f;
-    uint32_t bits;
-    memcpy(&bits, &t_near, sizeof bits);
-    --bits;
-    memcpy(&t_near, &bits, sizeof bits);
-    return t_near;
-}
-
 /* t is a rounded quotient and can leave the interval by a unit in the last place. */
 float within(float t, const gsii_embree_ray* ray) {
     return t < ray->t_near ? ray->t_near : t > ray->t_far ? ray->t_far : t;
@@ -93,7 +83,7 @@ void load(RTCRay* out, const gsii_embree_ray* ray, unsigned int mask) {
     out->org_x = ray->origin[0];
     out->org_y = ray->origin[1];
     out->org_z = ray->origin[2];
-    out->tnear = open_near(ray->t_near);
+    out->tnear = ray->t_near > 0.0f ? ray->t_near : 0.0f;
     out->dir_x = ray->direction[0];
     out->dir_y = ray->direction[1];
     out->dir_z = ray->direction[2];
@@ -151,7 +141,7 @@ void load8(RTCRay8* out, int* valid, const gsii_embree_ray* rays, size_t n, unsi
         out->org_x[k] = ray->origin[0];
         out->org_y[k] = ray->origin[1];
         out->org_z[k] = ray->origin[2];
-        out->tnear[k] = open_near(ray->t_near);
+        out->tnear[k] = ray->t_near > 0.0f ? ray->t_near : 0.0f;
         out->dir_x[k] = ray->direction[0];
         out->dir_y[k] = ray->direction[1];
         out->dir_z[k] = ray->direction[2];

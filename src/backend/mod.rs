@@ -3,10 +3,12 @@
 //! Two implementations: [`embree`] (production) and [`obvhs`] (pure Rust, validates the first). Queries go in
 //! batches, so that one dynamic call and one crossing of the FFI serve thousands of rays.
 
+pub mod compare;
 pub mod embree;
 pub mod obvhs;
 #[cfg(test)]
 mod tests;
+mod triangle;
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -17,12 +19,15 @@ use crate::error::Result;
 
 /// A ray and the part of it that counts, `t_near <= t <= t_far`, in units of the length of `direction`
 /// (unit length wherever a distance is meant).
+///
+/// Rays with NaN or infinite parts (but for `t_far`), without a direction or with `t_far < t_near` hit nothing.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
     /// Start point, in scene coordinates.
     pub origin: Vec3,
-    /// Smallest parameter at which a hit counts; not negative.
+    /// Smallest parameter at which a hit counts; negative is taken as 0, at which a ray that starts on a triangle
+    /// hits it.
     pub t_near: f32,
     /// Direction.
     pub direction: Vec3,
@@ -34,6 +39,12 @@ impl Ray {
     /// A ray from `origin` to infinity.
     pub fn new(origin: Vec3, direction: Vec3) -> Self {
         Ray { origin, t_near: 0.0, direction, t_far: f32::INFINITY }
+    }
+
+    /// Whether the ray can hit anything at all; see [`Ray`].
+    pub fn is_usable(&self) -> bool {
+        let Ray { origin, t_near, direction, t_far } = *self;
+        origin.is_finite() && direction.is_finite() && direction != Vec3::ZERO && t_near.is_finite() && t_far >= t_near
     }
 
     /// The point at parameter `t`.

@@ -51,7 +51,7 @@ pub struct RadiosityScene<'a> {
 }
 
 /// Where the flux went, W per band, f64. `emitted = absorbed + escaped + unshot` to rounding.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Ledger {
     /// Flux that light sources put into the scene (with [`DirectLight::Gather`]: that reached a patch).
     pub emitted: [f64; 3],

@@ -1,1 +1,168 @@
-//! Both render passes.
+//! Both render passes: HIRES (what the eye sees sharply) and LORES (indirect light), in one wavefront.
+
+pub mod bias;
+pub mod film;
+pub mod layers;
+pub mod show;
+pub mod integrator;
+pub mod nearness;
+pub mod path;
+pub mod plan;
+
+use std::time::{Duration, Instant};
+
+use rayon::prelude::*;
+
+pub use film::Film;
+pub use integrator::{FarField, PassTimes, RayCounts, World};
+pub use nearness::Nearness;
+use integrator::{Batch, Workspace};
+use path::Passes;
+use plan::Allocation;
+
+use crate::progress::Progress;
+use crate::sampling::hash_all;
+use crate::scene::Camera;
+
+/// Trials of one pixel that are traced as one batch; a tile of these fills the second-level cache.
+const BATCH_TRIALS: u32 = 32;
+
+/// Keeps the pilot's random numbers apart from the image's.
+const PILOT: u32 = 0x7069_6c6f;
+
+/// Parameters of [`render`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct RenderParams {
+    /// Width in pixels.
+    pub width: u32,
+    /// Height in pixels.
+    pub height: u32,
+    /// Fewest trials of a pixel in each pass.
+    pub min_trials: u32,
+    /// Most trials of a pixel in each pass; equal to `min_trials` for fixed sampling.
+    pub max_trials: u32,
+    /// Relative standard error of a pixel at which HIRES stops.
+    pub hires_error: f32,
+    /// Relative standard error of a pixel, both passes together, at which LORES stops.
+    pub lores_error: f32,
+    /// Seconds after which no new trials are begun.
+    pub time_limit: Option<Duration>,
+    /// Whether to record albedo, normal and depth.
+    pub features: bool,
+    /// Seed: the same seed gives the same image, bit for bit, for any number of threads.
+    pub seed: u32,
+}
+
+/// What came out.
+#[derive(Clone, Debug)]
+pub struct Rendering {
+    /// The image.
+    pub film: Film,
+    /// Rays traced.
+    pub rays: RayCounts,
+    /// Wall-clock time of both passes, shared out by the time that threads spent in them; the pilot is in both.
+    pub times: PassTimes,
+    /// Whether it was stopped before all planned trials were done.
+    pub stopped: bool,
+}
+
+/// Renders an image.
+///
+/// A pilot estimates the variance around each tile and decides how many trials each pass gets there; its trials are thrown
+/// away. Deciding on trials that are kept would bias the image towards dark (see `docs/method.md`).
+pub fn render(world: &World<'_>, camera: &Camera, params: &RenderParams, progress: &Progress) -> Rendering {
+    let start = Instant::now();
+    let deadline = params.time_limit.map(|limit| start + limit);
+    let over = || progress.stopped() || deadline.is_some_and(|d| Instant::now() >= d);
+    let mut renderer = Renderer { world, camera, params, rays: RayCounts::default(), times: PassTimes::default() };
+
+    let mut film = Film::new(params.width, params.height);
+    let plan = if params.min_trials == params.max_trials {
+        vec![Allocation { hires: params.min_trials, lores: params.min_trials }; film.tiles.len()]
+    } else {
+        let mut pilot = Film::new(params.width, params.height);
+        let trials = plan::pilot_trials(params);
+        let all = vec![Allocation { hires: trials, lores: trials }; film.tiles.len()];
+        renderer.round(&mut pilot, &all, 0..trials, hash_all(&[params.seed, PILOT]), &over, &|_| {});
+        plan::allocate(&pilot, params)
+    };
+
+    let planned: u64 = plan.iter().zip(&film.tiles).map(|(a, t)| u64::from(a.most()) * t.pixels.len() as u64).sum();
+    let bar = progress.stage("rendering", planned);
+    let most = plan.iter().map(Allocation::most).max().unwrap_or(0);
+    let mut done = 0;
+    let mut stopped = false;
+    // Rounds double, so that there is a whole image early and prefixes of the point sets stay well distributed.
+    while done < most && !stopped {
+        let next = (2 * done).max(params.min_trials.max(1)).min(most);
+        stopped = renderer.round(&mut film, &plan, done..next, params.seed, &over, &|n| bar.inc(n));
+        done = next;
+    }
+    bar.finish_and_clear();
+    Rendering { film, rays: renderer.rays, times: renderer.times.scaled_to(start.elapsed()), stopped }
+}
+
+struct Renderer<'a> {
+    world: &'a World<'a>,
+    camera: &'a Camera,
+    params: &'a RenderParams,
+    rays: RayCounts,
+    times: PassTimes,
+}
+
+impl Renderer<'_> {
+    /// Adds the trials with numbers in `range` to every tile whose allocation has them. Returns whether it was cut short.
+    fn round(
+        &mut self,
+        film: &mut Film,
+        plan: &[Allocation],
+        range: std::ops::Range<u32>,
+        seed: u32,
+        over: &(dyn Fn() -> bool + Sync),
+        advance: &(dyn Fn(u64) + Sync),
+    ) -> bool {
+        let size = [self.params.width, self.params.height];
+        let (world, camera, features) = (self.world, self.camera, self.params.features);
+        let work = film.tiles.par_iter_mut().zip(plan).map_init(Workspace::default, |ws, (tile, allocation)| {
+            (ws.counts, ws.times) = Default::default();
+            let mut cut = false;
+            for (trials, passes) in allocation.segments(range.clone()) {
+                let mut first = trials.start;
+                while first < trials.end {
+                    if over() {
+                        cut = true;
+                        break;
+                    }
+                    let count = BATCH_TRIALS.min(trials.end - first);
+                    let batch = Batch { first, trials: count, passes, seed };
+                    world.render_tile(ws, camera, size, batch, features && passes.hires, tile);
+                    advance(u64::from(count) * tile.pixels.len() as u64);
+                    first += count;
+                }
+            }
+            (ws.counts, ws.times, cut)
+        });
+        let (rays, times, cut) = work.reduce(
+            || (RayCounts::default(), PassTimes::default(), false),
+            |mut a, b| {
+                a.0 += b.0;
+                a.1 += b.1;
+                (a.0, a.1, a.2 | b.2)
+            },
+        );
+        self.rays += rays;
+        self.times += times;
+        cut
+    }
+}
+
+impl Allocation {
+    /// The parts of a range of trial numbers that this allocation has, and the passes they feed.
+    fn segments(&self, range: std::ops::Range<u32>) -> impl Iterator<Item = (std::ops::Range<u32>, Passes)> + use<> {
+        let both = self.hires.min(self.lores);
+        let single = if self.hires > self.lores { Passes::HIRES } else { Passes::LORES };
+        [(range.start..range.end.min(both), Passes::BOTH), (range.start.max(both)..range.end.min(self.most()), single)]
+            .into_iter()
+            .filter(|(r, _)| !r.is_empty())
+    }
+}

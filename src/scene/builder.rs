@@ -94,11 +94,9 @@ impl SceneBuilder {
             let t = (t, data.triangles[t]);
             return Err(self.error(format!("{name}: triangle {} has the vertices {:?}, but there are {n}", t.0, t.1)));
         }
-        let lengths =
-            [("normals", data.normals.len()), ("colors", data.colors.len())].into_iter().chain([
-                ("texture coordinates", data.uvs[0].len()),
-                ("second texture coordinates", data.uvs[1].len()),
-            ]);
+        let lengths = [("normals", data.normals.len()), ("colors", data.colors.len())]
+            .into_iter()
+            .chain([("texture coordinates", data.uvs[0].len()), ("second texture coordinates", data.uvs[1].len())]);
         for (what, length) in lengths {
             if length != 0 && length != n {
                 return Err(self.error(format!("{name}: {length} {what} for {n} vertices")));
@@ -233,7 +231,6 @@ fn flat(m: &DMat3) -> bool {
 /// How normals go with a linear map: the cofactor matrix times the sign of the determinant, which is the inverse
 /// transposed but for the length, and exists for every map. The result is not normalised.
 pub(super) fn normal_matrix(m: &DMat3) -> DMat3 {
-    let cofactors =
-        DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
+    let cofactors = DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
     cofactors * m.determinant().signum()
 }

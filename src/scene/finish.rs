@@ -230,7 +230,11 @@ fn kind(builder: &SceneBuilder, instance: &Instance) -> PartKind {
     PartKind::Opaque
 }
 
-fn place_light(light: &PunctualLight, transform: &DAffine3, centre: DVec3) -> std::result::Result<PunctualLight, String> {
+fn place_light(
+    light: &PunctualLight,
+    transform: &DAffine3,
+    centre: DVec3,
+) -> std::result::Result<PunctualLight, String> {
     let point = |p: Vec3| (transform.transform_point3(p.as_dvec3()) - centre).as_vec3();
     let vector = |v: Vec3| transform.transform_vector3(v.as_dvec3()).normalize_or_zero().as_vec3();
     let kind = match light.kind {

@@ -131,12 +131,8 @@ impl Material {
 
     /// All textures that it reads.
     pub fn texture_slots(&self) -> impl Iterator<Item = &TextureSlot> {
-        let slots = [
-            &self.base_color_texture,
-            &self.metallic_roughness_texture,
-            &self.normal_texture,
-            &self.emission_texture,
-        ];
+        let slots =
+            [&self.base_color_texture, &self.metallic_roughness_texture, &self.normal_texture, &self.emission_texture];
         slots.into_iter().flatten()
     }
 
@@ -146,11 +142,11 @@ impl Material {
             true => Ok(()),
             false => Err(format!("material '{}': {name} is {values:?}, must lie in 0..=1", self.name)),
         };
-        let at_least = |name: &str, values: &[f32], least: f32| match values.iter().all(|v| *v >= least && v.is_finite())
-        {
-            true => Ok(()),
-            false => Err(format!("material '{}': {name} is {values:?}, must be finite and >= {least}", self.name)),
-        };
+        let at_least =
+            |name: &str, values: &[f32], least: f32| match values.iter().all(|v| *v >= least && v.is_finite()) {
+                true => Ok(()),
+                false => Err(format!("material '{}': {name} is {values:?}, must be finite and >= {least}", self.name)),
+            };
         zero_one("the base colour (reflectance)", &self.base_color.to_array())?;
         zero_one("the opacity", &[self.opacity])?;
         zero_one("metallic", &[self.metallic])?;

@@ -13,6 +13,8 @@ pub mod material;
 pub mod mesh;
 mod overview;
 mod pane;
+#[cfg(test)]
+mod tests;
 pub mod texture;
 
 use glam::DVec3;

@@ -7,6 +7,8 @@ use super::{Camera, Mesh, Projection};
 
 /// Directions that are tried to find out whether the scene is a closed room.
 const PROBES: u32 = 64;
+/// Directions that are tried at once.
+const GROUP: u32 = 8;
 /// Share of probes that must meet a front face for that.
 const CLOSED_SHARE: f64 = 0.9;
 
@@ -15,17 +17,17 @@ const CLOSED_SHARE: f64 = 0.9;
 pub(super) fn camera(mesh: &Mesh) -> Camera {
     let bounds = if mesh.bounds.is_empty() { super::Aabb::of([-Vec3::ONE, Vec3::ONE]) } else { mesh.bounds };
     let centre = bounds.centre();
-    let probes: Vec<Option<Probe>> = (0..PROBES).into_par_iter().map(|i| probe(mesh, centre, spiral(i))).collect();
-    let surrounding = probes.iter().flatten().filter(|p| p.front).count();
-    let (position, target, y_fov) = if surrounding as f64 >= CLOSED_SHARE * f64::from(PROBES) {
+    let (position, target, y_fov) = if is_room(mesh, centre) {
         // Step back from the centre along the longest free horizontal way, and look across the room.
-        let way = |i: u32| {
-            let angle = std::f32::consts::TAU * (i as f32 + 0.5) / 16.0;
-            let d = Vec3::new(angle.cos(), 0.0, angle.sin());
-            (d, probe(mesh, centre, d).map_or(0.0, |p| p.distance))
-        };
-        let ways: Vec<(Vec3, f32)> = (0..16).into_par_iter().map(way).collect();
-        let longest = ways.into_iter().fold((Vec3::X, 0.0), |best, w| if w.1 > best.1 { w } else { best });
+        let ways: Vec<Vec3> = (0..16)
+            .map(|i| {
+                let (sin, cos) = (std::f32::consts::TAU * (i as f32 + 0.5) / 16.0).sin_cos();
+                Vec3::new(cos, 0.0, sin)
+            })
+            .collect();
+        let free = probe(mesh, centre, &ways).into_iter().map(|p| p.map_or(0.0, |p| p.distance));
+        let ways = ways.iter().copied().zip(free);
+        let longest = ways.fold((Vec3::X, 0.0), |best, w| if w.1 > best.1 { w } else { best });
         (centre + 0.9 * longest.1 * longest.0, centre, 75_f32.to_radians())
     } else {
         let y_fov = 45_f32.to_radians();
@@ -44,7 +46,22 @@ pub(super) fn camera(mesh: &Mesh) -> Camera {
     }
 }
 
+/// Whether nearly all directions from `centre` meet a front face first.
+fn is_room(mesh: &Mesh, centre: Vec3) -> bool {
+    let mut open = 0;
+    // Most scenes that are no rooms show it in the first few directions.
+    for group in 0..PROBES / GROUP {
+        let directions: Vec<Vec3> = (0..GROUP).map(|i| spiral(group + i * (PROBES / GROUP))).collect();
+        open += probe(mesh, centre, &directions).iter().filter(|p| !p.is_some_and(|p| p.front)).count();
+        if open as f64 > (1.0 - CLOSED_SHARE) * f64::from(PROBES) {
+            return false;
+        }
+    }
+    true
+}
+
 /// Nearest triangle along a direction.
+#[derive(Clone, Copy)]
 struct Probe {
     distance: f32,
     front: bool,
@@ -59,24 +76,33 @@ fn spiral(i: u32) -> Vec3 {
     glam::DVec3::new(r * cos, r * sin, z).as_vec3()
 }
 
-/// Nearest hit by trying every triangle (Möller and Trumbore 1997): this happens 80 times in the life of a scene, and the
-/// acceleration structure does not exist yet.
-fn probe(mesh: &Mesh, origin: Vec3, direction: Vec3) -> Option<Probe> {
-    let mut nearest = None;
-    let mut limit = f32::INFINITY;
-    for t in 0..mesh.triangles.len() as u32 {
-        let [a, b, c] = mesh.corners(t);
-        let (e1, e2, s) = (b - a, c - a, origin - a);
-        let p = direction.cross(e2);
-        let det = e1.dot(p);
-        let u = s.dot(p) / det;
-        let q = s.cross(e1);
-        let v = direction.dot(q) / det;
-        let distance = e2.dot(q) / det;
-        if u >= 0.0 && v >= 0.0 && u + v <= 1.0 && distance > 0.0 && distance < limit {
-            limit = distance;
-            nearest = Some(Probe { distance, front: det > 0.0 });
+/// Nearest hits by trying every triangle (Möller and Trumbore 1997): this happens a few dozen times in the life of a
+/// scene, and the acceleration structure does not exist yet.
+fn probe(mesh: &Mesh, origin: Vec3, directions: &[Vec3]) -> Vec<Option<Probe>> {
+    let nearer = |a: Option<Probe>, b: Option<Probe>| match (a, b) {
+        (Some(x), Some(y)) if y.distance < x.distance => b,
+        (None, _) => b,
+        _ => a,
+    };
+    let chunk = |triangles: &[[u32; 3]]| {
+        let mut nearest = vec![None; directions.len()];
+        for t in triangles {
+            let [a, b, c] = t.map(|i| mesh.positions[i as usize]);
+            let (e1, e2, s) = (b - a, c - a, origin - a);
+            let q = s.cross(e1);
+            for (nearest, &direction) in nearest.iter_mut().zip(directions) {
+                let p = direction.cross(e2);
+                let det = e1.dot(p);
+                let (u, v, distance) = (s.dot(p) / det, direction.dot(q) / det, e2.dot(q) / det);
+                if u >= 0.0 && v >= 0.0 && u + v <= 1.0 && distance > 0.0 {
+                    *nearest = nearer(*nearest, Some(Probe { distance, front: det > 0.0 }));
+                }
+            }
         }
-    }
-    nearest
+        nearest
+    };
+    // Chunks of fixed size, combined in order.
+    let chunks: Vec<Vec<Option<Probe>>> = mesh.triangles.par_chunks(1 << 16).map(chunk).collect();
+    let none = vec![None; directions.len()];
+    chunks.into_iter().fold(none, |all, c| all.into_iter().zip(c).map(|(a, b)| nearer(a, b)).collect())
 }

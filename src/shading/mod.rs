@@ -3,8 +3,17 @@
 //! A BSDF is split as in the paper, `f = f_h + f_l`: highly directional (mirror, glass, glossy under a roughness
 //! threshold) and weakly directional (diffuse and rough lobes).
 
+mod albedo;
 pub mod bsdf;
+mod fresnel;
+mod ggx;
+mod glass;
+mod layered;
 pub mod point;
+#[cfg(test)]
+mod testing;
+#[cfg(test)]
+mod tests;
 
 pub use bsdf::{Bsdf, BsdfSample};
 pub use point::SurfacePoint;

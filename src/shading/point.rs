@@ -1,9 +1,20 @@
 //! Surface points with error bounds, and ray origins that stay on the right side.
 
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Mat3, Vec2, Vec3};
 
 use crate::backend::Hit;
-use crate::scene::Scene;
+use crate::scene::{Material, Scene};
+
+/// Unit roundoff of f32, 2^-24.
+const ROUNDOFF: f64 = f32::EPSILON as f64 * 0.5;
+
+/// Roundings that one product in the determinant of a ray-triangle test goes through: translation of the vertices
+/// (1), two edges from them (3 each, as their error is absolute), two products, a difference and a dot product (5),
+/// rounded up for terms of second order.
+const TEST_ROUNDINGS: f64 = 16.0;
+
+/// Cosine of the largest angle between geometric and shading normal, 89 degrees.
+const MIN_NORMAL_COSINE: f32 = 0.017_452_406;
 
 /// Geometry of a point on a surface.
 #[derive(Clone, Copy, Debug)]
@@ -15,9 +26,9 @@ pub struct SurfacePoint {
     pub error: Vec3,
     /// Unit geometric normal of the counter-clockwise face (not flipped towards the viewer).
     pub geometric_normal: Vec3,
-    /// Unit shading normal on the side of `geometric_normal`.
+    /// Unit shading normal on the side of `geometric_normal`, at most 89 degrees away from it.
     pub shading_normal: Vec3,
-    /// First and second texture coordinates.
+    /// First and second texture coordinates; zero where the mesh has none.
     pub uv: [Vec2; 2],
     /// Triangle.
     pub triangle: u32,
@@ -30,14 +41,308 @@ pub struct SurfacePoint {
 impl SurfacePoint {
     /// The point that `hit` names. `hit` must be a hit on `scene.mesh`.
     pub fn new(scene: &Scene, hit: &Hit) -> Self {
-        let _ = (scene, hit);
-        todo!("shading helper")
+        let mesh = &scene.mesh;
+        let indices = mesh.triangles[hit.triangle as usize].map(|i| i as usize);
+        let (position, error, geometric_normal) = locate(mesh.corners(hit.triangle), hit.u, hit.v);
+        let weights = [1.0 - hit.u - hit.v, hit.u, hit.v];
+
+        let uv = [&mesh.uvs[0], &mesh.uvs[1]].map(|set| {
+            if set.is_empty() {
+                return Vec2::ZERO;
+            }
+            weights[0] * set[indices[0]] + weights[1] * set[indices[1]] + weights[2] * set[indices[2]]
+        });
+        let mut shading_normal = geometric_normal;
+        if !mesh.normals.is_empty() {
+            let normals = indices.map(|i| mesh.normals[i]);
+            if normals.iter().all(|n| *n != Vec3::ZERO) {
+                let sum = weights[0] * normals[0] + weights[1] * normals[1] + weights[2] * normals[2];
+                shading_normal = sum.normalize_or(geometric_normal);
+                if shading_normal.dot(geometric_normal) < 0.0 {
+                    shading_normal = -shading_normal;
+                }
+            }
+        }
+        let mut point = SurfacePoint {
+            position,
+            error,
+            geometric_normal,
+            shading_normal,
+            uv,
+            triangle: hit.triangle,
+            u: hit.u,
+            v: hit.v,
+        };
+        let material = &scene.materials[mesh.object(hit.triangle).material as usize];
+        if material.normal_texture.is_some() {
+            point.shading_normal = point.mapped_normal(scene, material).unwrap_or(shading_normal);
+        }
+        point.shading_normal = within_limit(point.shading_normal, geometric_normal);
+        point
     }
 
     /// Origin for a ray that leaves into `direction`: moved along the geometric normal to the side of `direction`
     /// by the error bound, and rounded away from the surface (pbrt 4ed 6.8.6).
     pub fn ray_origin(&self, direction: Vec3) -> Vec3 {
-        let _ = direction;
-        todo!("shading helper")
+        let n = self.geometric_normal;
+        let distance = n.abs().dot(self.error);
+        let offset = if direction.dot(n) < 0.0 { -distance * n } else { distance * n };
+        let away = |origin: f32, offset: f32| {
+            if offset > 0.0 {
+                origin.next_up()
+            } else if offset < 0.0 {
+                origin.next_down()
+            } else {
+                origin
+            }
+        };
+        let origin = self.position + offset;
+        Vec3::new(away(origin.x, offset.x), away(origin.y, offset.y), away(origin.z, offset.z))
+    }
+
+    /// The shading normal as the normal map bends it; `None` where texture coordinates span no area.
+    fn mapped_normal(&self, scene: &Scene, material: &Material) -> Option<Vec3> {
+        let slot = material.normal_texture.as_ref()?;
+        let set = usize::from(slot.uv_set);
+        let coordinates = scene.mesh.uvs.get(set).filter(|uvs| !uvs.is_empty())?;
+        let [a, b, c] = scene.mesh.triangles[self.triangle as usize].map(|i| coordinates[i as usize]);
+        let [duv1, duv2] = [b - a, c - a].map(|d| slot.transform.transform_vector2(d));
+        let [a, b, c] = scene.mesh.corners(self.triangle);
+        let frame = texture_frame(self.shading_normal, [b - a, c - a], [duv1, duv2])?;
+
+        let uv = slot.transform.transform_point2(self.uv[set]);
+        let map = 2.0 * scene.textures[slot.texture as usize].sample(uv).truncate() - Vec3::ONE;
+        let scale = material.normal_scale;
+        let bent = (frame * Vec3::new(map.x * scale, map.y * scale, map.z)).try_normalize()?;
+        (bent.dot(self.geometric_normal) > 0.0).then_some(bent)
+    }
+}
+
+/// Position, error bound and unit normal at barycentric weights `u` and `v` of the second and third corner.
+///
+/// Evaluated in f64, so that the position's own error is its rounding to f32. The larger part of the bound is the
+/// error of a later f32 intersection test from there: the signed distance to the plane is a determinant of vectors
+/// no longer than the triangle's extent `w` along each axis, divided by the length of the normal; its six products
+/// are each off by at most [`TEST_ROUNDINGS`] roundings. That holds for Moeller-Trumbore as for Embree's robust
+/// (Pluecker) test, and is nothing for walls along the axes.
+fn locate(corners: [Vec3; 3], u: f32, v: f32) -> (Vec3, Vec3, Vec3) {
+    let [a, b, c] = corners.map(Vec3::as_dvec3);
+    let (e1, e2) = (b - a, c - a);
+    let cross = e1.cross(e2);
+    let double_area = cross.length();
+    let position = (a + f64::from(u) * e1 + f64::from(v) * e2).as_vec3();
+    let rounding = ROUNDOFF * position.as_dvec3().abs() + 8.0 * f64::EPSILON * (a.abs() + b.abs() + c.abs());
+    if double_area == 0.0 {
+        return (position, rounding.as_vec3(), Vec3::ZERO);
+    }
+    let normal = cross / double_area;
+    let extent = a.max(b).max(c) - a.min(b).min(c) + rounding;
+    let test_error = |w: DVec3| 6.0 * TEST_ROUNDINGS * ROUNDOFF * w.x * w.y * w.z / double_area;
+    // The origin moves off the triangle by the bound itself, which lengthens the vectors a little.
+    let moved = normal.abs().dot(rounding) + test_error(extent);
+    let distance = test_error(extent + 2.0 * moved * normal.abs());
+    (position, (rounding + distance * normal.abs()).as_vec3(), normal.as_vec3())
+}
+
+/// Axes of a normal map on a triangle with these edges in space and in texture coordinates: x along u, y up in the
+/// image, which is against v, z along `normal`.
+fn texture_frame(normal: Vec3, edges: [Vec3; 2], uv_edges: [Vec2; 2]) -> Option<Mat3> {
+    let area = uv_edges[0].perp_dot(uv_edges[1]);
+    if area == 0.0 {
+        return None;
+    }
+    let along_u = (edges[0] * uv_edges[1].y - edges[1] * uv_edges[0].y) * area.signum();
+    let tangent = (along_u - normal * normal.dot(along_u)).try_normalize()?;
+    // Seen from the front, an image that is not mirrored has v clockwise from u: negative area.
+    Some(Mat3::from_cols(tangent, normal.cross(tangent) * -area.signum(), normal))
+}
+
+/// `normal`, turned towards `geometric` until it is at most 89 degrees away.
+fn within_limit(normal: Vec3, geometric: Vec3) -> Vec3 {
+    if normal.dot(geometric) >= MIN_NORMAL_COSINE {
+        return normal;
+    }
+    let tangent = (normal - geometric * normal.dot(geometric)).normalize_or_zero();
+    let sine = (1.0 - MIN_NORMAL_COSINE * MIN_NORMAL_COSINE).sqrt();
+    (geometric * MIN_NORMAL_COSINE + tangent * sine).normalize_or(geometric)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampling::{hash_all, uniform_sphere, unit};
+    use crate::shading::testing::scene_of;
+
+    /// Moeller and Trumbore 1997, in f32, both faces; the ray parameter where `0 <= t`.
+    fn moeller_trumbore([a, b, c]: [Vec3; 3], origin: Vec3, direction: Vec3) -> Option<f32> {
+        let (e1, e2) = (b - a, c - a);
+        let p = direction.cross(e2);
+        let inverse = 1.0 / e1.dot(p);
+        let s = origin - a;
+        let u = s.dot(p) * inverse;
+        let q = s.cross(e1);
+        let v = direction.dot(q) * inverse;
+        let t = e2.dot(q) * inverse;
+        (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t >= 0.0 && t.is_finite()).then_some(t)
+    }
+
+    /// The edge test in Pluecker coordinates relative to the origin, in f32, both faces.
+    fn pluecker([a, b, c]: [Vec3; 3], origin: Vec3, direction: Vec3) -> Option<f32> {
+        let [v0, v1, v2] = [a - origin, b - origin, c - origin];
+        let (e0, e1, e2) = (v2 - v0, v0 - v1, v1 - v2);
+        let u = (v2 + v0).cross(e0).dot(direction);
+        let v = (v0 + v1).cross(e1).dot(direction);
+        let w = (v1 + v2).cross(e2).dot(direction);
+        let slack = f32::EPSILON * (u + v + w).abs();
+        let inside = u.min(v).min(w) >= -slack || u.max(v).max(w) <= slack;
+        let n = e0.cross(e1);
+        let t = v0.dot(n) / n.dot(direction);
+        (inside && t >= 0.0 && t.is_finite()).then_some(t)
+    }
+
+    fn random(keys: &[u32]) -> f32 {
+        unit(hash_all(keys))
+    }
+
+    /// A triangle whose coordinates spread over 16 decades, as in pbrt's Triangle.Reintersect.
+    fn wild_triangle(seed: u32) -> [Vec3; 3] {
+        std::array::from_fn(|vertex| {
+            Vec3::from_array(std::array::from_fn(|axis| {
+                let key = [seed, vertex as u32, axis as u32];
+                let size = 10.0_f32.powf(-8.0 + 16.0 * random(&[1, key[0], key[1], key[2]]));
+                if random(&[2, key[0], key[1], key[2]]) < 0.5 { -size } else { size }
+            }))
+        })
+    }
+
+    fn barycentrics(seed: u32) -> (f32, f32) {
+        let (r, s) = (random(&[3, seed]).sqrt(), random(&[4, seed]));
+        (1.0 - r, s * r)
+    }
+
+    #[test]
+    fn no_ray_hits_the_triangle_it_leaves() {
+        let mut rays = 0;
+        for seed in 0..1000 {
+            // Every third one a shape as in rooms, at a distance from the origin.
+            let corners = if seed % 3 == 0 {
+                std::array::from_fn(|i| {
+                    let r = |k| random(&[5, seed, i as u32, k]);
+                    Vec3::new(10.0 + 4.0 * r(0), -3.0 + 4.0 * r(1), 8.0 + 0.1 * r(2))
+                })
+            } else {
+                wild_triangle(seed)
+            };
+            let scene = scene_of(corners, Material::default());
+            if scene.mesh.normal(0) == Vec3::ZERO {
+                continue;
+            }
+            for k in 0..500 {
+                let key = hash_all(&[seed, k]);
+                let (u, v) = barycentrics(key);
+                let point = SurfacePoint::new(&scene, &Hit { t: 1.0, u, v, triangle: 0 });
+                let mut direction = uniform_sphere(Vec2::new(random(&[6, key]), random(&[7, key])));
+                if k % 4 == 0 {
+                    // Grazing rays are where the sign of the determinant is in doubt.
+                    let n = point.geometric_normal;
+                    let tilt = 1e-6 * (random(&[8, key]) - 0.5);
+                    direction = (direction - n * n.dot(direction) + tilt * n).normalize();
+                }
+                let origin = point.ray_origin(direction);
+                let moeller = moeller_trumbore(corners, origin, direction);
+                assert_eq!(moeller, None, "Moeller-Trumbore, {corners:?}, {point:?}, {direction}");
+                assert_eq!(pluecker(corners, origin, direction), None, "Pluecker, {corners:?}, {point:?}, {direction}");
+                rays += 1;
+            }
+        }
+        assert!(rays > 400_000);
+    }
+
+    #[test]
+    fn the_tests_above_can_hit() {
+        let corners = [Vec3::ZERO, Vec3::X, Vec3::Y];
+        let (origin, direction) = (Vec3::new(0.25, 0.25, 1.0), Vec3::NEG_Z);
+        assert_eq!(moeller_trumbore(corners, origin, direction), Some(1.0));
+        assert_eq!(pluecker(corners, origin, direction), Some(1.0));
+    }
+
+    /// Two sheets 1e-4 apart at coordinates of 10: a ray that leaves one inwards must meet the other.
+    #[test]
+    fn thin_walls_do_not_leak() {
+        for seed in 0..300 {
+            // An axis-aligned wall, then tilted ones.
+            let normal = if seed < 100 {
+                [Vec3::X, Vec3::Y, Vec3::Z][seed as usize % 3]
+            } else {
+                uniform_sphere(Vec2::new(random(&[11, seed]), random(&[12, seed])))
+            };
+            let frame = crate::sampling::basis(normal);
+            let centre = Vec3::new(10.0, -9.0, 8.0);
+            let near = [(-3.0, -3.0), (3.0, -3.0), (0.0, 3.0)].map(|(x, y)| centre + frame * Vec3::new(x, y, 0.0));
+            let far = near.map(|p| p - 1e-4 * normal);
+            let scene = scene_of(near, Material::default());
+            for k in 0..100 {
+                let (u, v) = (0.2 + 0.2 * random(&[13, seed, k]), 0.2 + 0.2 * random(&[14, seed, k]));
+                let point = SurfacePoint::new(&scene, &Hit { t: 1.0, u, v, triangle: 0 });
+                let mut direction = uniform_sphere(Vec2::new(random(&[15, seed, k]), random(&[16, seed, k])));
+                if direction.dot(normal) > 0.0 {
+                    direction = -direction;
+                }
+                if direction.dot(normal) > -0.01 {
+                    continue;
+                }
+                let origin = point.ray_origin(direction);
+                assert!(moeller_trumbore(far, origin, direction).is_some(), "{normal} {direction} {point:?}");
+                assert!(pluecker(far, origin, direction).is_some(), "{normal} {direction} {point:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn position_error_is_bounded() {
+        for seed in 0..2000 {
+            let mut corners = wild_triangle(seed);
+            if seed % 2 == 0 {
+                // In a plane along the axes the bound is that of the position alone.
+                corners[1].z = corners[0].z;
+                corners[2].z = corners[0].z;
+            }
+            let (u, v) = barycentrics(seed);
+            let scene = scene_of(corners, Material::default());
+            let point = SurfacePoint::new(&scene, &Hit { t: 1.0, u, v, triangle: 0 });
+            let [a, b, c] = corners.map(Vec3::as_dvec3);
+            let exact = (1.0 - f64::from(u) - f64::from(v)) * a + f64::from(u) * b + f64::from(v) * c;
+            let off = (point.position.as_dvec3() - exact).abs();
+            assert!(off.cmple(point.error.as_dvec3()).all(), "{corners:?}: off {off}, bound {}", point.error);
+        }
+    }
+
+    #[test]
+    fn shading_normal_is_interpolated_on_the_geometric_side() {
+        let corners = [Vec3::ZERO, Vec3::X, Vec3::Y];
+        let mut scene = scene_of(corners, Material::default());
+        let hit = Hit { t: 1.0, u: 0.25, v: 0.25, triangle: 0 };
+        assert_eq!(SurfacePoint::new(&scene, &hit).shading_normal, Vec3::Z);
+        let tilted = Vec3::new(0.6, 0.0, 0.8);
+        scene.mesh.normals = vec![-tilted; 3];
+        assert!((SurfacePoint::new(&scene, &hit).shading_normal - tilted).length() < 1e-6);
+        scene.mesh.normals = vec![tilted, tilted, Vec3::ZERO];
+        assert_eq!(SurfacePoint::new(&scene, &hit).shading_normal, Vec3::Z);
+        scene.mesh.normals = vec![Vec3::X; 3];
+        let limited = SurfacePoint::new(&scene, &hit).shading_normal;
+        assert!((limited.z - MIN_NORMAL_COSINE).abs() < 1e-6 && limited.is_normalized());
+    }
+
+    #[test]
+    fn normal_map_axes_follow_the_image() {
+        // A unit square seen from +z with the image upright on it: v runs down.
+        let upright = |x: f32, y: f32| Vec2::new(x, 1.0 - y);
+        let uv_edges = [upright(1.0, 0.0) - upright(0.0, 0.0), upright(0.0, 1.0) - upright(0.0, 0.0)];
+        assert_eq!(texture_frame(Vec3::Z, [Vec3::X, Vec3::Y], uv_edges), Some(Mat3::IDENTITY));
+        // Mirrored: u runs to the left, up stays up.
+        let mirrored = uv_edges.map(|d| Vec2::new(-d.x, d.y));
+        let expected = Mat3::from_cols(Vec3::NEG_X, Vec3::Y, Vec3::Z);
+        assert_eq!(texture_frame(Vec3::Z, [Vec3::X, Vec3::Y], mirrored), Some(expected));
+        assert_eq!(texture_frame(Vec3::Z, [Vec3::X, Vec3::Y], [Vec2::ONE; 2]), None);
     }
 }

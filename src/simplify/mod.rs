@@ -25,7 +25,8 @@ use crate::progress::Progress;
 use crate::scene::{Aabb, AlphaFilter, Scene};
 
 /// How a cluster's box is fitted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, serde::Serialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
 pub enum BoxFit {
     /// Conserves intercepted flux, escape albedo a face patch. The default.
     #[default]
@@ -79,6 +80,13 @@ pub enum Class {
     },
 }
 
+impl Class {
+    /// Whether it is left out of the simplified scene without anything in its place.
+    pub fn is_isolated(self) -> bool {
+        self == Class::Complex { cluster: None }
+    }
+}
+
 /// A group of small surfaces and the box that replaces it.
 #[derive(Clone, Debug)]
 pub struct Cluster {
@@ -110,6 +118,16 @@ pub struct EquivalentBox {
     pub resolution: u32,
     /// Reflectances of `resolution^2` patches for each face.
     pub reflectance: [Vec<Vec3>; 6],
+}
+
+impl EquivalentBox {
+    /// Axis-aligned bounds, world space.
+    pub fn bounds(&self) -> Aabb {
+        let reach = self.axes.x_axis.abs() * self.half.x
+            + self.axes.y_axis.abs() * self.half.y
+            + self.axes.z_axis.abs() * self.half.z;
+        Aabb { min: self.centre - reach, max: self.centre + reach }
+    }
 }
 
 /// Cluster against box, on rays that were not used to fit it.

@@ -156,17 +156,23 @@ GsiiReader* gsii_oiio_open(const char* path, const void* memory, size_t size, Gs
         // Colours stay as stored, not multiplied by alpha.
         hints.attribute("oiio:UnassociatedAlpha", 1);
         if (memory) {
-            // Without this check the plugin would look for a file of that name.
-            auto plugin = ImageInput::create(path);
-            if (!plugin || !plugin->supports("ioproxy")) {
-                (void)OIIO::geterror();
+            // Only by the name of a format is a reader made without opening a file: OpenImageIO 2.4 looks for a file
+            // of the given name first and fails without it, whatever proxy it is given.
+            const char* dot = std::strrchr(path, '.');
+            reader->input = ImageInput::create(dot ? dot + 1 : path);
+            if (!reader->input)
+                fail(reader->input, "OpenImageIO knows no such format");
+            if (!reader->input->supports("ioproxy"))
                 throw std::runtime_error("this format is not read from memory");
-            }
             reader->memory = std::make_unique<Filesystem::IOMemReader>(memory, size);
+            ImageSpec spec;
+            if (!reader->input->set_ioproxy(reader->memory.get()) || !reader->input->open(path, spec, hints))
+                fail(reader->input, "not an image that OpenImageIO can read");
+        } else {
+            reader->input = ImageInput::open(path, &hints);
+            if (!reader->input)
+                fail(reader->input, "not an image that OpenImageIO can read");
         }
-        reader->input = ImageInput::open(path, &hints, reader->memory.get());
-        if (!reader->input)
-            fail(reader->input, "not an image that OpenImageIO can read");
         reader->spec = reader->input->spec();
 
         const ImageSpec& spec = reader->spec;

@@ -43,7 +43,9 @@ impl<'a> Buffers<'a> {
         };
         if bytes.len() < declared {
             let have = bytes.len();
-            return Err(format!("buffer {index} declares {declared} bytes but only {have} are there; it is incomplete"));
+            return Err(format!(
+                "buffer {index} declares {declared} bytes but only {have} are there; it is incomplete"
+            ));
         }
         Ok(bytes)
     }

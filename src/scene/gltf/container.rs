@@ -117,9 +117,10 @@ pub(super) fn read_uri(uri: &str) -> Result<Uri<'_>, String> {
             Err(e) => Err(format!("a data URI is no valid base64: {e}")),
         };
     }
-    let scheme = uri.split_once(':').map(|(s, _)| s).filter(|s| {
-        s.len() > 1 && s.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c))
-    });
+    let scheme = uri
+        .split_once(':')
+        .map(|(s, _)| s)
+        .filter(|s| s.len() > 1 && s.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c)));
     if let Some(scheme) = scheme {
         return Err(format!("'{scheme}:' URIs are not fetched; download the file and refer to it by a relative path"));
     }

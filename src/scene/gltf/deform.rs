@@ -78,7 +78,12 @@ impl Deformation<'_> {
     }
 }
 
-fn skin(joints: &[DMat4], attributes: &Attributes<'_, '_>, vertices: &[u32], data: &mut MeshData) -> Result<(), String> {
+fn skin(
+    joints: &[DMat4],
+    attributes: &Attributes<'_, '_>,
+    vertices: &[u32],
+    data: &mut MeshData,
+) -> Result<(), String> {
     let mut sets = Vec::new();
     for set in 0..2 {
         let numbers = attributes.get(Semantic::Joints(set), &[Type::Vec4], JOINT)?;

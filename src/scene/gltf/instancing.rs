@@ -13,7 +13,10 @@ pub(super) fn transforms(root: &Root, buffers: &Buffers<'_>, node: &Node) -> Res
     let Some(extension) = node.extensions.as_ref().and_then(|e| e.others.get("EXT_mesh_gpu_instancing")) else {
         return Ok(None);
     };
-    let attribute = |name: &str, kind: Type, components: &[ComponentType]| match extension.pointer("/attributes").and_then(|a| a.get(name)) {
+    let attribute = |name: &str, kind: Type, components: &[ComponentType]| match extension
+        .pointer("/attributes")
+        .and_then(|a| a.get(name))
+    {
         Some(index) => {
             let index = Value::as_u64(index).and_then(|i| usize::try_from(i).ok());
             let index = index.ok_or_else(|| format!("EXT_mesh_gpu_instancing: {name} is no accessor number"))?;
@@ -23,8 +26,7 @@ pub(super) fn transforms(root: &Root, buffers: &Buffers<'_>, node: &Node) -> Res
     };
     let float = [ComponentType::F32];
     let translation = attribute("TRANSLATION", Type::Vec3, &float)?;
-    let rotation =
-        attribute("ROTATION", Type::Vec4, &[ComponentType::F32, ComponentType::I8, ComponentType::I16])?;
+    let rotation = attribute("ROTATION", Type::Vec4, &[ComponentType::F32, ComponentType::I8, ComponentType::I16])?;
     let scale = attribute("SCALE", Type::Vec3, &float)?;
     let mut counts = [&translation, &rotation, &scale].into_iter().flatten().map(|e| e.count);
     let Some(count) = counts.next() else { return Ok(Some(vec![DAffine3::IDENTITY])) };

@@ -24,9 +24,7 @@ pub(super) fn convert(
     let mut slot = |info: &texture::Info, coding: Coding| -> Result<TextureSlot, String> {
         let transform = info.extensions.as_ref().and_then(|e| e.texture_transform.as_ref());
         let (affine, set) = match transform {
-            Some(t) => {
-                (affine(t.offset.0, t.rotation.0, t.scale.0), t.tex_coord.unwrap_or(info.tex_coord))
-            }
+            Some(t) => (affine(t.offset.0, t.rotation.0, t.scale.0), t.tex_coord.unwrap_or(info.tex_coord)),
             None => (Affine2::IDENTITY, info.tex_coord),
         };
         textures.slot(info.index.value(), set, affine, coding).map_err(|e| format!("material '{name}': {e}"))

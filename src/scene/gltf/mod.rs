@@ -13,6 +13,8 @@ mod materials;
 mod nodes;
 mod primitive;
 mod punctual;
+#[cfg(test)]
+mod tests;
 mod textures;
 
 use std::collections::BTreeMap;

@@ -1,0 +1,101 @@
+//! `gsii info`: what is in a scene and what would be done.
+
+use std::process::ExitCode;
+
+use clap::Args;
+
+use super::options::{MethodOptions, SceneOptions, Talk, load};
+use crate::error::Result;
+use crate::pipeline::{Prepared, Stats, choose_camera};
+use crate::scene::{LightKind, Projection, Scene};
+
+/// Options of `gsii info`.
+#[derive(Args, Debug)]
+pub struct Options {
+    #[command(flatten)]
+    scene: SceneOptions,
+    #[command(flatten)]
+    method: MethodOptions,
+    #[command(flatten)]
+    talk: Talk,
+    /// Only the contents of the file: no simplification, no radiosity
+    #[arg(long)]
+    contents: bool,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// As loading and preparing the scene.
+pub fn run(options: &Options) -> Result<ExitCode> {
+    options.method.set_threads()?;
+    let progress = options.talk.progress();
+    let mut stats = Stats::new();
+    let scene = load(&options.scene, &mut stats)?;
+    print_contents(&scene, stats.seconds.load);
+    if options.contents {
+        return Ok(ExitCode::SUCCESS);
+    }
+    let camera = choose_camera(&scene, options.scene.camera.as_deref())?.clone();
+    let prepared = Prepared::new(scene, &camera, options.method.settings(), &progress, &mut stats)?;
+    print_plan(&prepared, &stats);
+    Ok(ExitCode::SUCCESS)
+}
+
+fn print_contents(scene: &Scene, seconds: f64) {
+    let mesh = &scene.mesh;
+    let size = mesh.bounds.size();
+    println!("{} (read in {seconds:.2} s)", scene.name);
+    println!("  size        {:.4} x {:.4} x {:.4}, centre {:.4}", size.x, size.y, size.z, scene.centre);
+    println!("  triangles   {} in {} objects", mesh.triangles.len(), mesh.objects.len());
+    println!("  materials   {}, textures {}", scene.materials.len(), scene.textures.len());
+    let emitting = mesh.objects.iter().filter(|o| scene.materials[o.material as usize].is_emitter());
+    let (objects, triangles) = emitting.fold((0, 0), |(o, t), object| (o + 1, t + object.triangles.len()));
+    println!("  emitters    {triangles} triangles in {objects} objects");
+    for light in &scene.lights {
+        let kind = match light.kind {
+            LightKind::Point { .. } => "point",
+            LightKind::Spot { .. } => "spot",
+            LightKind::Directional { .. } => "directional",
+        };
+        println!("  light       {} ({kind}), intensity {}", light.name, light.intensity);
+    }
+    for (i, camera) in scene.cameras.iter().enumerate() {
+        let kind = match camera.projection {
+            Projection::Perspective { y_fov } => format!("perspective, {:.1} degrees high", y_fov.to_degrees()),
+            Projection::Orthographic { x_mag, y_mag } => format!("orthographic, {x_mag} x {y_mag}"),
+        };
+        println!("  camera {i}    {} ({kind})", camera.name);
+    }
+    let notes = &scene.notes;
+    for (count, what) in [
+        (notes.degenerate_triangles, "triangles without area"),
+        (notes.duplicate_triangles, "repeated triangles"),
+        (notes.non_finite_triangles, "triangles with coordinates that are not finite"),
+    ] {
+        if count > 0 {
+            println!("  dropped     {count} {what}");
+        }
+    }
+}
+
+fn print_plan(prepared: &Prepared, stats: &Stats) {
+    let settings = &prepared.settings;
+    println!("with --method {}", serde_json::json!(settings.method).as_str().unwrap_or_default());
+    let Some(far) = &prepared.far else {
+        println!("  path tracing: nothing is simplified");
+        return;
+    };
+    println!("  r_thresh    {:.4}, beta {:.4}", settings.r_thresh(), settings.beta);
+    if let Some(simplified) = &far.simplified {
+        let count = &stats.counts;
+        println!("  A_thresh    {:.4}", simplified.a_thresh);
+        println!("  surfaces    {} = {} normal + {} complex", count.surfaces, count.normal, count.complex);
+        println!("  clusters    {}, mean misfit of intercepted flux {:.3}", count.clusters, stats.error.fit);
+        println!("  simplified  {} surfaces, {} triangles", count.normal + count.simple, far.geometry.triangles.len());
+    }
+    println!("  patches     {} of size {:.4}", stats.counts.patches, settings.patch_size.unwrap_or(0.0));
+    println!("  radiosity   error {:.4}, {} shots, {} rays", stats.error.radiosity, far.solution.shots, far.solution.rays);
+    let s = &stats.seconds;
+    println!("  seconds     simplify {:.2}, build {:.2}, radiosity {:.2}", s.simplify, s.build, s.radiosity);
+}

@@ -1,0 +1,63 @@
+//! The command line: a thin face over the library.
+
+pub mod compare;
+pub mod info;
+pub mod options;
+pub mod render;
+pub mod validate;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+use crate::error::Error;
+
+/// Physically accurate images of cluttered scenes on a CPU, fast, with a stated error.
+#[derive(Debug, Parser)]
+#[command(name = "gsii", version, about, after_help = "Exit codes: 0 done, 1 failed while running, 2 bad usage or bad input.")]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Render an image of a glTF scene
+    Render(render::Options),
+    /// Show what is in a scene and what would be done with it
+    Info(info::Options),
+    /// Compare Embree with obvhs, ray by ray, on a scene's own rays
+    Validate(validate::Options),
+    /// Error metrics of an image against a reference
+    Compare(compare::Options),
+}
+
+/// Runs the command line and returns its exit code.
+pub fn run() -> ExitCode {
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) => {
+            // Help and version are no errors; clap prints them to standard output.
+            let code = if error.use_stderr() { 2 } else { 0 };
+            let _ = error.print();
+            return ExitCode::from(code);
+        }
+    };
+    let outcome = match &arguments.command {
+        Command::Render(options) => render::run(options),
+        Command::Info(options) => info::run(options),
+        Command::Validate(options) => validate::run(options),
+        Command::Compare(options) => compare::run(options),
+    };
+    match outcome {
+        Ok(code) => code,
+        Err(error) => {
+            report(&error);
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+fn report(error: &Error) {
+    eprintln!("gsii: {error}");
+}

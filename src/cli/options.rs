@@ -1,0 +1,159 @@
+//! Options that several commands share.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+use std::sync::Arc;
+use std::time::Instant;
+
+use clap::Args;
+
+use crate::error::{Error, Result};
+use crate::pipeline::{BackendKind, GeometryKind, Method, Settings, Stats};
+use crate::progress::Progress;
+use crate::scene::{self, Scene};
+use crate::simplify::BoxFit;
+
+/// A length or `auto`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LengthOrAuto(pub Option<f32>);
+
+impl FromStr for LengthOrAuto {
+    type Err = String;
+
+    fn from_str(s: &str) -> std::result::Result<Self, String> {
+        if s == "auto" {
+            return Ok(LengthOrAuto(None));
+        }
+        s.parse().map(|l| LengthOrAuto(Some(l))).map_err(|_| "expected a length (0.25, inf) or 'auto'".to_owned())
+    }
+}
+
+/// Which scene, and how it is seen.
+#[derive(Args, Debug)]
+pub struct SceneOptions {
+    /// glTF 2.0 file (.glb or .gltf)
+    pub scene: PathBuf,
+    /// Camera, by name or number (default: the first)
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub camera: Option<String>,
+}
+
+/// How light is computed.
+#[derive(Args, Debug)]
+pub struct MethodOptions {
+    /// Method: gsii; or pmm, mcpt, radiosity for comparison
+    #[arg(long, value_enum, default_value_t, help_heading = "Method")]
+    pub method: Method,
+    /// Geometry of '--method radiosity': normal + simple or normal + complex surfaces
+    #[arg(long, value_enum, default_value_t, help_heading = "Method")]
+    pub geometry: GeometryKind,
+    /// Distance up to which indirect light is traced in the detailed scene (scene units; 0 is PMM, inf is path tracing)
+    #[arg(long, value_name = "LENGTH|auto", default_value = "auto", help_heading = "Method")]
+    pub r_thresh: LengthOrAuto,
+    /// Share of the hemisphere that one dropped surface may fill, 0..1 [default: 1/2pi]
+    #[arg(long, value_name = "X", help_heading = "Method")]
+    pub beta: Option<f32>,
+    /// Stop radiosity when this share of the emitted flux is unshot
+    #[arg(long, value_name = "X", default_value_t = Settings::default().unshot, help_heading = "Method")]
+    pub unshot: f64,
+    /// Edge length of radiosity patches (scene units)
+    #[arg(long, value_name = "LENGTH|auto", default_value = "auto", help_heading = "Method")]
+    pub patch_size: LengthOrAuto,
+    /// How boxes are fitted to clusters
+    #[arg(long = "box", value_enum, default_value_t, help_heading = "Method")]
+    pub box_fit: BoxFit,
+    /// Scattering events after which paths end [default: unlimited]
+    #[arg(long, value_name = "N", help_heading = "Method")]
+    pub max_depth: Option<u32>,
+    /// Seed: the same seed gives the same image, bit for bit
+    #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Run")]
+    pub seed: u32,
+    /// Threads [default: all]
+    #[arg(long, value_name = "N", help_heading = "Run")]
+    pub threads: Option<usize>,
+    /// Ray-tracing library
+    #[arg(long, value_enum, default_value_t, help_heading = "Run")]
+    pub backend: BackendKind,
+}
+
+/// How much is said.
+#[derive(Args, Debug)]
+pub struct Talk {
+    /// Say nothing but errors
+    #[arg(long, short, help_heading = "Run", conflicts_with = "verbose")]
+    pub quiet: bool,
+    /// Say more: what was chosen, what the importer noticed
+    #[arg(long, short, help_heading = "Run")]
+    pub verbose: bool,
+}
+
+impl Talk {
+    /// Progress bars unless quiet, and logging as loud as wished.
+    pub fn progress(&self) -> Progress {
+        let level = match (self.quiet, self.verbose) {
+            (true, _) => log::LevelFilter::Error,
+            (_, true) => log::LevelFilter::Debug,
+            _ => log::LevelFilter::Warn,
+        };
+        // A second initialisation in one process (tests) keeps the first one's settings.
+        let _ = env_logger::Builder::new().filter_level(level).format_target(false).format_timestamp(None).try_init();
+        if self.quiet { Progress::silent() } else { Progress::on_terminal() }
+    }
+
+    /// Prints a line on standard error unless quiet.
+    pub fn say(&self, line: impl AsRef<str>) {
+        if !self.quiet {
+            eprintln!("{}", line.as_ref());
+        }
+    }
+}
+
+impl MethodOptions {
+    /// As library settings.
+    pub fn settings(&self) -> Settings {
+        let default = Settings::default();
+        Settings {
+            method: self.method,
+            geometry: self.geometry,
+            r_thresh: self.r_thresh.0,
+            beta: self.beta.unwrap_or(default.beta),
+            box_fit: self.box_fit,
+            patch_size: self.patch_size.0,
+            unshot: self.unshot,
+            max_depth: self.max_depth.unwrap_or(default.max_depth),
+            backend: self.backend,
+            threads: self.threads.unwrap_or(0),
+            seed: self.seed,
+            ..default
+        }
+    }
+
+    /// Sets the size of rayon's pool.
+    ///
+    /// # Errors
+    /// Zero threads.
+    pub fn set_threads(&self) -> Result<()> {
+        if self.threads == Some(0) {
+            return Err(Error::Usage("--threads must be at least 1".to_owned()));
+        }
+        if let Some(n) = self.threads {
+            // Fails only when the pool already exists, which keeps its size.
+            let _ = rayon::ThreadPoolBuilder::new().num_threads(n).build_global();
+        }
+        Ok(())
+    }
+}
+
+/// Reads a scene, noting time and warnings.
+///
+/// # Errors
+/// As [`scene::gltf::load`].
+pub fn load(options: &SceneOptions, stats: &mut Stats) -> Result<Arc<Scene>> {
+    let start = Instant::now();
+    let scene = scene::gltf::load(&options.scene, &scene::gltf::LoadOptions::default())?;
+    stats.seconds.load = start.elapsed().as_secs_f64();
+    for warning in &scene.notes.warnings {
+        log::warn!("{}: {warning}", scene.name);
+    }
+    Ok(Arc::new(scene))
+}

@@ -1,0 +1,418 @@
+//! Light sources with area: single triangles, and rectangles made of two.
+
+use std::f64::consts::TAU;
+
+use glam::{DMat3, DVec3, Vec2, Vec3};
+
+use super::spherical::{Rectangle, Triangle, uniform_triangle};
+use crate::backend::Hit;
+use crate::scene::{Alpha, Material, Scene, TextureSlot};
+
+/// How far from a right angle (cosine) and from a parallelogram (share of the shorter side) two triangles may be to count
+/// as a rectangle.
+const RECTANGLE_TOLERANCE: f64 = 1e-4;
+
+/// Squared ratio of distance to radius beyond which points are chosen by area. From there (3e-4 sr when facing,
+/// the limit of pbrt 4ed 6.5.4) the density per solid angle varies by less than a few percent over the light, and the
+/// choice by area is exact and cheap. Lights that are small only because they are seen edge-on stay with the solid angle.
+const FAR_SQUARED: f64 = 1e4;
+
+/// Smallest solid angle that is sampled as such; the f64 formulas are good to about 1e-15 sr.
+const MIN_SOLID_ANGLE: f64 = 1e-7;
+
+/// A point that sees a light source under a hemisphere less this solid angle is on it, as far as positions tell: its
+/// distance is less than about 1e-9 of the light's size.
+const ON_THE_LIGHT: f64 = 1e-9;
+
+/// Texture samples along one side of a triangle, at most.
+const MAX_TEXTURE_STEPS: u32 = 512;
+
+/// An emitting triangle or rectangle.
+#[derive(Clone, Debug)]
+pub(super) struct AreaLight {
+    /// First corner (of a rectangle: where the first triangle has its right angle).
+    corner: DVec3,
+    /// From the first corner to the second and third; counter-clockwise.
+    edges: [DVec3; 2],
+    /// Cross product of the edges.
+    cross: DVec3,
+    /// Centre of gravity, and the largest distance of a corner from it.
+    centre: DVec3,
+    radius: f64,
+    /// Area, f64.
+    area: f64,
+    /// The triangle, or both of a rectangle (the second `Hit::NONE` for a triangle).
+    pub triangles: [u32; 2],
+    /// Which of its three corners a triangle of a rectangle has at its right angle.
+    right_corner: [u8; 2],
+    /// Mean emitted radiance.
+    pub radiance: Vec3,
+    /// Whether the radiance differs from point to point.
+    varies: bool,
+    /// Whether the clockwise side emits, too.
+    pub both_faces: bool,
+}
+
+/// A point on a light source.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct AreaPoint {
+    pub position: DVec3,
+    pub triangle: u32,
+    /// Barycentric weights of the triangle's second and third vertex.
+    pub uv: Vec2,
+}
+
+/// How points of a light source are chosen from one point of view.
+#[derive(Clone, Copy, Debug)]
+enum View {
+    Area,
+    /// In its frame: columns are its axes and the direction from the point of view to its plane.
+    Rectangle(Rectangle, DMat3, f64),
+    Triangle(Triangle, f64),
+}
+
+impl AreaLight {
+    /// Whether it is made of two triangles.
+    pub(super) fn is_rectangle(&self) -> bool {
+        self.triangles[1] != Hit::NONE
+    }
+
+    /// Area in square scene units.
+    pub(super) fn area(&self) -> f64 {
+        self.area
+    }
+
+    /// Unit normal of the counter-clockwise side.
+    pub(super) fn normal(&self) -> DVec3 {
+        self.cross.normalize_or_zero()
+    }
+
+    /// First corner.
+    #[cfg(test)]
+    pub(super) fn first_corner(&self) -> DVec3 {
+        self.corner
+    }
+
+    /// Centre of gravity and largest distance from it.
+    pub(super) fn sphere(&self) -> (Vec3, f32) {
+        (self.centre.as_vec3(), self.radius as f32)
+    }
+
+    /// Corner points.
+    pub(super) fn corners(&self) -> impl Iterator<Item = Vec3> {
+        let [e, f] = self.edges;
+        let last = if self.is_rectangle() { e + f } else { f };
+        [DVec3::ZERO, e, f, last].into_iter().map(move |o| (self.corner + o).as_vec3())
+    }
+
+    /// Radiance emitted at a point of one of its triangles.
+    pub(super) fn radiance_at(&self, scene: &Scene, point: &AreaPoint) -> Vec3 {
+        if self.varies { emission(scene, point.triangle, point.uv.x, point.uv.y) } else { self.radiance }
+    }
+
+    /// A uniform point; continuous in `u` on rectangles.
+    pub(super) fn uniform_point(&self, u: [f32; 2]) -> AreaPoint {
+        let u = u.map(f64::from);
+        self.at(if self.is_rectangle() { u } else { uniform_triangle(u) })
+    }
+
+    /// A point as seen from `position`, its offset from there, and its density per solid angle. `None` from the dark
+    /// side or from edge-on. The offset keeps its direction where the difference of the points would be lost in rounding.
+    pub(super) fn sample(&self, position: DVec3, u: [f32; 2]) -> Option<(AreaPoint, DVec3, f64)> {
+        let view = self.view(position)?;
+        Some(match view {
+            View::Area => {
+                let point = self.uniform_point(u);
+                let offset = point.position - position;
+                (point, offset, self.area_density(offset)?)
+            }
+            View::Rectangle(rectangle, axes, angle) => {
+                let [x, y] = rectangle.sample(angle, u.map(f64::from));
+                let share = |v: f64, [v0, v1]: [f64; 2]| ((v - v0) / (v1 - v0)).clamp(0.0, 1.0);
+                let point = self.at([share(x, rectangle.x), share(y, rectangle.y)]);
+                (point, axes * DVec3::new(x, y, rectangle.z), 1.0 / angle)
+            }
+            View::Triangle(triangle, angle) => {
+                let (direction, weights) = triangle.sample(angle, u.map(f64::from));
+                let distance = (self.corner - position).dot(self.cross) / direction.dot(self.cross);
+                // No point is farther than the corners; a direction within rounding of the plane may say so (or NaN)
+                let distance = distance.abs().min(triangle.farthest());
+                (self.at(weights), distance * direction, 1.0 / angle)
+            }
+        })
+    }
+
+    /// Density per solid angle with which [`AreaLight::sample`] chooses the point at `offset` from `position`.
+    pub(super) fn density(&self, position: DVec3, offset: DVec3) -> f64 {
+        match self.view(position) {
+            None => 0.0,
+            Some(View::Area) => self.area_density(offset).unwrap_or(0.0),
+            Some(View::Rectangle(_, _, angle) | View::Triangle(_, angle)) => 1.0 / angle,
+        }
+    }
+
+    fn area_density(&self, offset: DVec3) -> Option<f64> {
+        let d2 = offset.length_squared();
+        // area times cosine, without dividing by the length of the cross product
+        let scale = if self.is_rectangle() { 1.0 } else { 0.5 };
+        let projected = scale * offset.dot(self.cross).abs();
+        let density = d2 * d2.sqrt() / projected;
+        (density.is_finite() && density > 0.0).then_some(density)
+    }
+
+    fn view(&self, position: DVec3) -> Option<View> {
+        let corner = self.corner - position;
+        // Positive on the counter-clockwise side
+        let side = -corner.dot(self.cross);
+        if side == 0.0 || (side < 0.0 && !self.both_faces) {
+            return None;
+        }
+        if (self.centre - position).length_squared() > FAR_SQUARED * self.radius * self.radius {
+            return Some(View::Area);
+        }
+        let (view, angle) = if self.is_rectangle() {
+            let lengths = self.edges.map(DVec3::length);
+            let x = self.edges[0] / lengths[0];
+            let normal = self.normal();
+            let y = normal.cross(x);
+            let (x0, y0) = (corner.dot(x), corner.dot(y));
+            let z = side.abs() / self.area;
+            let rectangle = Rectangle { x: [x0, x0 + lengths[0]], y: [y0, y0 + lengths[1]], z };
+            let angle = rectangle.solid_angle();
+            (View::Rectangle(rectangle, DMat3::from_cols(x, y, -side.signum() * normal), angle), angle)
+        } else {
+            let triangle = Triangle::new(corner, self.edges, self.cross);
+            let angle = triangle.solid_angle();
+            (View::Triangle(triangle, angle), angle)
+        };
+        if angle > TAU - ON_THE_LIGHT {
+            return None;
+        }
+        // Also where NaN
+        Some(if angle >= MIN_SOLID_ANGLE { view } else { View::Area })
+    }
+
+    /// The point `corner + s e0 + t e1`.
+    fn at(&self, [s, t]: [f64; 2]) -> AreaPoint {
+        let position = self.corner + s * self.edges[0] + t * self.edges[1];
+        if !self.is_rectangle() {
+            return AreaPoint { position, triangle: self.triangles[0], uv: Vec2::new(s as f32, t as f32) };
+        }
+        // Weights of the right-angled corner and, counter-clockwise, of the other two
+        let half = usize::from(s + t > 1.0);
+        let weights = if half == 0 { [1.0 - s - t, s, t] } else { [s + t - 1.0, 1.0 - s, 1.0 - t] };
+        let right = usize::from(self.right_corner[half]);
+        let weight = |vertex: usize| weights[(vertex + 3 - right) % 3] as f32;
+        AreaPoint { position, triangle: self.triangles[half], uv: Vec2::new(weight(1), weight(2)) }
+    }
+}
+
+/// The light sources with area of a scene.
+#[derive(Debug, Default)]
+pub(super) struct AreaLights {
+    pub lights: Vec<AreaLight>,
+    /// For each object the first entry of `light_of`, or `Hit::NONE`.
+    first: Vec<u32>,
+    /// For each triangle of emitting objects its light, or `Hit::NONE`.
+    light_of: Vec<u32>,
+    /// Triangles of emitting materials without area or without light.
+    pub dropped: usize,
+}
+
+impl AreaLights {
+    /// Collects the emitting triangles and joins pairs to rectangles.
+    pub(super) fn new(scene: &Scene) -> Self {
+        let mut all = AreaLights::default();
+        for object in &scene.mesh.objects {
+            let material = &scene.materials[object.material as usize];
+            if !material.is_emitter() {
+                all.first.push(Hit::NONE);
+                continue;
+            }
+            let first = all.light_of.len();
+            all.first.push(first as u32);
+            all.light_of.resize(first + object.triangles.len(), Hit::NONE);
+            let mut lights: Vec<AreaLight> = Vec::new();
+            for triangle in object.triangles.clone() {
+                match triangle_light(scene, triangle) {
+                    Some(light) => lights.push(light),
+                    None => all.dropped += 1,
+                }
+            }
+            for light in join_rectangles(scene, lights) {
+                for triangle in light.triangles.into_iter().filter(|&t| t != Hit::NONE) {
+                    all.light_of[first + (triangle - object.triangles.start) as usize] = all.lights.len() as u32;
+                }
+                all.lights.push(light);
+            }
+        }
+        all
+    }
+
+    /// The light that `triangle` belongs to.
+    pub(super) fn of_triangle(&self, scene: &Scene, triangle: u32) -> Option<usize> {
+        let object = scene.mesh.object_of_triangle[triangle as usize] as usize;
+        let first = self.first[object];
+        if first == Hit::NONE {
+            return None;
+        }
+        let offset = triangle - scene.mesh.objects[object].triangles.start;
+        let light = self.light_of[(first + offset) as usize];
+        (light != Hit::NONE).then_some(light as usize)
+    }
+}
+
+/// A triangle of an emitting material as a light, unless it has no area or is black.
+fn triangle_light(scene: &Scene, triangle: u32) -> Option<AreaLight> {
+    let [a, b, c] = scene.mesh.corners(triangle).map(Vec3::as_dvec3);
+    let edges = [b - a, c - a];
+    let cross = edges[0].cross(edges[1]);
+    let area = 0.5 * cross.length();
+    let material = &scene.materials[scene.mesh.object(triangle).material as usize];
+    let radiance = mean_radiance(scene, triangle);
+    if !(area > 0.0 && area.is_finite() && radiance.max_element() > 0.0 && radiance.is_finite()) {
+        return None;
+    }
+    let centre = (a + b + c) / 3.0;
+    let radius = [a, b, c].into_iter().map(|p| p.distance(centre)).fold(0.0, f64::max);
+    Some(AreaLight {
+        corner: a,
+        edges,
+        cross,
+        centre,
+        radius,
+        area,
+        triangles: [triangle, Hit::NONE],
+        right_corner: [0; 2],
+        radiance,
+        varies: varies(material),
+        both_faces: material.double_sided,
+    })
+}
+
+/// Whether emission or presence differ from point to point.
+fn varies(material: &Material) -> bool {
+    material.emission_texture.is_some() || material.alpha != Alpha::Opaque
+}
+
+/// Radiance emitted at a point, weighted with the probability that the surface is there: shadow rays end before it, and
+/// do not ask.
+fn emission(scene: &Scene, triangle: u32, u: f32, v: f32) -> Vec3 {
+    scene.emission(triangle, u, v) * scene.opacity(triangle, u, v)
+}
+
+/// Mean of the radiance emitted by a triangle: one sample a texel along its sides.
+fn mean_radiance(scene: &Scene, triangle: u32) -> Vec3 {
+    let material = scene.material(triangle);
+    if !varies(material) {
+        return material.emission;
+    }
+    let side_in_texels = |slot: &TextureSlot| {
+        let texture = &scene.textures[slot.texture as usize];
+        let size = Vec2::new(texture.width as f32, texture.height as f32);
+        let at = |u, v| slot.transform.transform_point2(scene.uv(slot.uv_set, triangle, u, v)) * size;
+        let (a, b, c) = (at(0.0, 0.0), at(1.0, 0.0), at(0.0, 1.0));
+        a.distance(b).max(b.distance(c)).max(c.distance(a))
+    };
+    let alpha = material.base_color_texture.as_ref().filter(|_| material.alpha != Alpha::Opaque);
+    let side = material.emission_texture.iter().chain(alpha).map(side_in_texels).fold(1.0, f32::max);
+    let steps = (side.ceil() as u32).min(MAX_TEXTURE_STEPS);
+    // Centres of steps^2 congruent triangles, the upright ones and those upside down
+    let mut sum = DVec3::ZERO;
+    for i in 0..steps {
+        for j in 0..steps - i {
+            let at = |o: f32| {
+                let scale = 1.0 / steps as f32;
+                emission(scene, triangle, (i as f32 + o) * scale, (j as f32 + o) * scale).as_dvec3()
+            };
+            sum += at(1.0 / 3.0);
+            if i + j + 1 < steps {
+                sum += at(2.0 / 3.0);
+            }
+        }
+    }
+    (sum / f64::from(steps * steps)).as_vec3()
+}
+
+/// Joins pairs of lights of one object that make up a rectangle.
+fn join_rectangles(scene: &Scene, lights: Vec<AreaLight>) -> Vec<AreaLight> {
+    // The two halves of a rectangle share their hypotenuse; sorting brings them together. Positions, not indices:
+    // files often repeat vertices
+    let mut diagonals: Vec<([[u32; 3]; 2], usize, u8)> = Vec::new();
+    for (i, light) in lights.iter().enumerate() {
+        let corners = scene.mesh.corners(light.triangles[0]);
+        if let Some(right) = right_corner(corners) {
+            let key = |k: usize| corners[(usize::from(right) + k) % 3].to_array().map(|c| (c + 0.0).to_bits());
+            let (p, q) = (key(1), key(2));
+            diagonals.push(([p.min(q), p.max(q)], i, right));
+        }
+    }
+    diagonals.sort_unstable();
+    let mut partner: Vec<Option<(usize, [u8; 2])>> = vec![None; lights.len()];
+    let mut i = 0;
+    while i + 1 < diagonals.len() {
+        let ((key, first, right), (other_key, second, other_right)) = (diagonals[i], diagonals[i + 1]);
+        let pair = [(first, right), (second, other_right)];
+        if key == other_key && is_rectangle(scene, pair.map(|(l, r)| (lights[l].triangles[0], r))) {
+            partner[first] = Some((second, [right, other_right]));
+            partner[second] = Some((first, [other_right, right]));
+            i += 1;
+        }
+        i += 1;
+    }
+    let mut joined = Vec::with_capacity(lights.len());
+    for (i, light) in lights.iter().enumerate() {
+        match partner[i] {
+            None => joined.push(light.clone()),
+            Some((other, right_corner)) if i < other => {
+                joined.push(rectangle_light(scene, light, &lights[other], right_corner));
+            }
+            Some(_) => {}
+        }
+    }
+    joined
+}
+
+/// The corner with a right angle.
+fn right_corner(corners: [Vec3; 3]) -> Option<u8> {
+    let p = corners.map(Vec3::as_dvec3);
+    (0..3_u8).find(|&k| {
+        let at = |i: usize| p[(usize::from(k) + i) % 3];
+        let (e, f) = (at(1) - at(0), at(2) - at(0));
+        e.dot(f).abs() <= RECTANGLE_TOLERANCE * e.length() * f.length()
+    })
+}
+
+/// Whether two right-angled triangles with a common hypotenuse make up a rectangle that emits to one side.
+fn is_rectangle(scene: &Scene, halves: [(u32, u8); 2]) -> bool {
+    let [[a, b, c], [d, e, f]] = halves.map(|(triangle, right)| {
+        let corners = scene.mesh.corners(triangle).map(Vec3::as_dvec3);
+        [0, 1, 2].map(|k| corners[(usize::from(right) + k) % 3])
+    });
+    // Counter-clockwise both, the common edge runs the other way in the second
+    let same_side = b == f && c == e;
+    let tolerance = RECTANGLE_TOLERANCE * a.distance(b).min(a.distance(c));
+    same_side && (b + c - a).distance(d) <= tolerance
+}
+
+fn rectangle_light(scene: &Scene, first: &AreaLight, second: &AreaLight, right_corner: [u8; 2]) -> AreaLight {
+    let corners = scene.mesh.corners(first.triangles[0]).map(Vec3::as_dvec3);
+    let [a, b, c] = [0, 1, 2].map(|k| corners[(usize::from(right_corner[0]) + k) % 3]);
+    let edges = [b - a, c - a];
+    let cross = edges[0].cross(edges[1]);
+    let mean = (first.radiance.as_dvec3() * first.area + second.radiance.as_dvec3() * second.area)
+        / (first.area + second.area);
+    AreaLight {
+        corner: a,
+        edges,
+        cross,
+        centre: 0.5 * (b + c),
+        radius: 0.5 * b.distance(c),
+        area: cross.length(),
+        triangles: [first.triangles[0], second.triangles[0]],
+        right_corner,
+        radiance: mean.as_vec3(),
+        varies: first.varies,
+        both_faces: first.both_faces,
+    }
+}

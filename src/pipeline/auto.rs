@@ -1,0 +1,81 @@
+//! Choices the user left open, made from the scene.
+
+use glam::{Vec2, Vec3};
+
+use super::{Method, Settings};
+use crate::backend::{Coherence, Hit, Ray, RayScene, Visible};
+use crate::sampling::{basis, cosine_hemisphere, sobol};
+use crate::scene::{Camera, Scene};
+use crate::shading::SurfacePoint;
+
+/// View rays that measure the room.
+const PROBES: u32 = 1024;
+
+/// Automatic `r_thresh` over the median length of a gather ray. The paper's 0.053 of its room's length is about this share of
+/// the median there.
+const R_THRESH_SHARE: f32 = 0.12;
+
+/// Automatic patch size over `r_thresh`: the patch that a far ray looks up must be small against the ray.
+const PATCH_SHARE: f32 = 0.75;
+
+/// Patch size over the median gather ray where nothing is simplified.
+const COMPLETE_PATCH_SHARE: f32 = 0.08;
+
+/// Fills in what is `None`.
+pub fn fill_in(settings: &mut Settings, scene: &Scene, detailed: &dyn RayScene, camera: &Camera) {
+    if settings.method == Method::Mcpt {
+        settings.r_thresh = Some(f32::INFINITY);
+        return;
+    }
+    if settings.r_thresh.is_some() && settings.patch_size.is_some() {
+        return;
+    }
+    let median = median_gather_distance(scene, detailed, camera)
+        .unwrap_or_else(|| 0.5 * scene.mesh.bounds.diagonal())
+        .max(f32::MIN_POSITIVE);
+    if settings.method == Method::Pmm {
+        settings.r_thresh = Some(0.0);
+    }
+    let r_thresh = *settings.r_thresh.get_or_insert(R_THRESH_SHARE * median);
+    let by_distance = COMPLETE_PATCH_SHARE * median;
+    settings.patch_size.get_or_insert(if r_thresh > 0.0 && r_thresh.is_finite() {
+        (PATCH_SHARE * r_thresh).min(2.0 * by_distance)
+    } else {
+        by_distance
+    });
+}
+
+/// Median length of cosine-distributed rays from what the camera sees; `None` when it sees nothing.
+pub fn median_gather_distance(scene: &Scene, detailed: &dyn RayScene, camera: &Camera) -> Option<f32> {
+    const STREAM: u32 = 0x6175_746f;
+    let views: Vec<Ray> = (0..PROBES)
+        .map(|i| {
+            let u = sobol(i, 0, STREAM);
+            camera.ray(Vec2::new(u[0], u[1]), camera.aspect.unwrap_or(1.5))
+        })
+        .collect();
+    let mut hits = vec![Hit::MISS; views.len()];
+    detailed.closest(&views, Visible::All, Coherence::Coherent, &mut hits);
+    let gathers: Vec<Ray> = views
+        .iter()
+        .zip(&hits)
+        .enumerate()
+        .filter(|(_, (_, hit))| hit.is_hit())
+        .map(|(i, (view, hit))| {
+            let point = SurfacePoint::new(scene, hit);
+            let normal = if point.geometric_normal.dot(view.direction) < 0.0 {
+                point.geometric_normal
+            } else {
+                -point.geometric_normal
+            };
+            let u = sobol(i as u32, 1, STREAM);
+            let direction: Vec3 = basis(normal) * cosine_hemisphere(Vec2::new(u[0], u[1]));
+            Ray::new(point.ray_origin(direction), direction)
+        })
+        .collect();
+    let mut hits = vec![Hit::MISS; gathers.len()];
+    detailed.closest(&gathers, Visible::All, Coherence::Incoherent, &mut hits);
+    let mut lengths: Vec<f32> = hits.iter().filter(|h| h.is_hit()).map(|h| h.t).collect();
+    lengths.sort_by(f32::total_cmp);
+    lengths.get(lengths.len() / 2).copied()
+}

@@ -1,0 +1,223 @@
+//! From a scene to everything the renderer needs, and the record of what was done.
+
+pub mod auto;
+pub mod settings;
+pub mod stats;
+
+use std::sync::Arc;
+use std::time::Instant;
+
+pub use settings::{BackendKind, GeometryKind, Method, Settings};
+pub use stats::Stats;
+
+use crate::backend::embree::EmbreeBackend;
+use crate::backend::obvhs::ObvhsBackend;
+use crate::backend::{HitFilter, PartKind, RayBackend, RayScene, TriangleSet};
+use crate::error::{Error, Result};
+use crate::lighting::Lights;
+use crate::progress::Progress;
+use crate::radiosity::{self, RadiosityParams, RadiosityScene, Solution};
+use crate::render::{FarField, Nearness, World};
+use crate::scene::alpha::AlphaFilter;
+use crate::scene::{Camera, Scene};
+use crate::simplify::{self, Simplified, SimplifiedGeometry, SimplifyParams, TriangleSource};
+
+/// A scene, prepared for one method: acceleration structures, simplified scene, radiosity solution.
+pub struct Prepared {
+    /// The scene.
+    pub scene: Arc<Scene>,
+    /// Its light sources.
+    pub lights: Lights,
+    /// Normal and complex surfaces.
+    pub detailed: Box<dyn RayScene>,
+    /// What light from beyond `r_thresh` is taken from; `None` for path tracing.
+    pub far: Option<Far>,
+    /// Settings with every automatic choice filled in.
+    pub settings: Settings,
+}
+
+/// The far field's parts; see [`FarField`].
+pub struct Far {
+    /// How the simplification came about; `None` where the geometry is complete (PMM).
+    pub simplified: Option<Simplified>,
+    /// The triangles that radiosity was solved on.
+    pub geometry: SimplifiedGeometry,
+    /// The same, for rays.
+    pub rays: Box<dyn RayScene>,
+    /// Radiosities.
+    pub solution: Solution,
+    /// Where near parts of gather rays need the detailed scene.
+    pub nearness: Option<Nearness>,
+}
+
+impl Prepared {
+    /// Does everything that comes before the first pixel; times and counts go to `stats`.
+    ///
+    /// # Errors
+    /// Usage errors in the settings, backend failures, scenes without a steady state.
+    pub fn new(
+        scene: Arc<Scene>,
+        camera: &Camera,
+        mut settings: Settings,
+        progress: &Progress,
+        stats: &mut Stats,
+    ) -> Result<Prepared> {
+        settings.check()?;
+        let backend = settings.backend.create(settings.threads)?;
+        let filter: Arc<dyn HitFilter> = Arc::new(AlphaFilter::new(Arc::clone(&scene)));
+        let start = Instant::now();
+        let parts = scene.mesh.parts();
+        let detailed = backend.build(&TriangleSet {
+            positions: &scene.mesh.positions,
+            triangles: &scene.mesh.triangles,
+            parts: &parts,
+            filter: Some(Arc::clone(&filter)),
+        })?;
+        let lights = Lights::new(&scene);
+        stats.seconds.build += start.elapsed().as_secs_f64();
+        stats.backend = backend.name();
+        stats.counts.triangles = scene.mesh.triangles.len() as u64;
+
+        auto::fill_in(&mut settings, &scene, detailed.as_ref(), camera);
+        let far = match settings.method {
+            Method::Mcpt => None,
+            Method::Gsii if settings.r_thresh() == f32::INFINITY => None,
+            _ => Some(Far::new(&scene, &lights, backend.as_ref(), &filter, &settings, progress, stats)?),
+        };
+        stats.parameters = settings.parameters();
+        Ok(Prepared { scene, lights, detailed, far, settings })
+    }
+
+    /// What the renderer works with.
+    pub fn world(&self) -> World<'_> {
+        World {
+            scene: &self.scene,
+            lights: &self.lights,
+            detailed: self.detailed.as_ref(),
+            has_panes: self.scene.mesh.objects.iter().any(|o| o.kind == PartKind::Pane),
+            far: self.far.as_ref().map(|far| FarField {
+                rays: far.rays.as_ref(),
+                geometry: &far.geometry,
+                solution: &far.solution,
+                r_thresh: if self.settings.method == Method::Gsii { self.settings.r_thresh() } else { 0.0 },
+                nearness: far.nearness.as_ref(),
+            }),
+            glossy_threshold: self.settings.glossy_threshold,
+            max_depth: self.settings.max_depth,
+        }
+    }
+}
+
+impl Far {
+    fn new(
+        scene: &Arc<Scene>,
+        lights: &Lights,
+        backend: &dyn RayBackend,
+        filter: &Arc<dyn HitFilter>,
+        settings: &Settings,
+        progress: &Progress,
+        stats: &mut Stats,
+    ) -> Result<Far> {
+        let start = Instant::now();
+        let simplified = simplify::simplify(scene, backend, &settings.simplify_params(), progress)?;
+        stats.record_simplified(&simplified);
+        let complete = settings.complete_geometry();
+        let geometry = if complete {
+            SimplifiedGeometry::complete(scene, &simplified.surface_of_triangle)
+        } else {
+            simplified.geometry.clone()
+        };
+        stats.seconds.simplify += start.elapsed().as_secs_f64();
+
+        let start = Instant::now();
+        let sources = geometry.sources.clone();
+        let filter = SimplifiedFilter { sources, scene_filter: Arc::clone(filter) };
+        let rays = backend.build(&TriangleSet { filter: Some(Arc::new(filter)), ..geometry.triangle_set() })?;
+        let nearness = (!complete).then(|| {
+            let reach = 1.5 * settings.r_thresh();
+            let clusters = simplified.clusters.iter().map(|c| c.bounds.union(c.equivalent_box.bounds()));
+            let dropped = simplified.surfaces.iter().filter(|s| s.class.is_isolated()).map(|s| s.bounds);
+            Nearness::new(scene.mesh.bounds, clusters.chain(dropped), reach)
+        });
+        stats.seconds.build += start.elapsed().as_secs_f64();
+
+        let start = Instant::now();
+        let clusters: &[_] = if complete { &[] } else { &simplified.clusters };
+        let input = RadiosityScene { scene, lights, geometry: &geometry, clusters, rays: rays.as_ref() };
+        let solution = radiosity::solve(&input, &settings.radiosity_params(), progress)?;
+        stats.seconds.radiosity += start.elapsed().as_secs_f64();
+        stats.record_solution(&solution);
+        Ok(Far { simplified: (!complete).then_some(simplified), geometry, rays, solution, nearness })
+    }
+}
+
+/// Puts alpha tests of the simplified geometry to the scene's own filter.
+struct SimplifiedFilter {
+    sources: Vec<TriangleSource>,
+    scene_filter: Arc<dyn HitFilter>,
+}
+
+impl HitFilter for SimplifiedFilter {
+    fn accepts(&self, triangle: u32, u: f32, v: f32) -> bool {
+        match self.sources[triangle as usize] {
+            TriangleSource::Scene { triangle } => self.scene_filter.accepts(triangle, u, v),
+            TriangleSource::BoxFace { .. } => true,
+        }
+    }
+}
+
+impl BackendKind {
+    /// Starts the library.
+    ///
+    /// # Errors
+    /// When it cannot be used, for instance because it is older than the headers it was bound with.
+    pub fn create(self, threads: usize) -> Result<Box<dyn RayBackend>> {
+        Ok(match self {
+            BackendKind::Embree => Box::new(EmbreeBackend::new(threads)?),
+            BackendKind::Obvhs => Box::new(ObvhsBackend),
+        })
+    }
+}
+
+/// The camera that a name or a number means.
+///
+/// # Errors
+/// When the scene has no such camera; the message lists those it has.
+pub fn choose_camera<'a>(scene: &'a Scene, wanted: Option<&str>) -> Result<&'a Camera> {
+    let Some(wanted) = wanted else {
+        return scene.cameras.first().ok_or_else(|| Error::Usage(format!("{} has no camera", scene.name)));
+    };
+    let by_name = scene.cameras.iter().find(|c| c.name == wanted);
+    let by_number = || wanted.parse::<usize>().ok().and_then(|i| scene.cameras.get(i));
+    by_name.or_else(by_number).ok_or_else(|| {
+        let names: Vec<String> =
+            scene.cameras.iter().enumerate().map(|(i, c)| format!("{i} ({})", c.name)).collect();
+        Error::Usage(format!("{} has no camera '{wanted}'; it has {}", scene.name, names.join(", ")))
+    })
+}
+
+/// Keeps the parameter types of the stages in one place.
+impl Settings {
+    /// Parameters for [`simplify::simplify`]. PMM and radiosity on N+C keep every surface.
+    pub fn simplify_params(&self) -> SimplifyParams {
+        SimplifyParams {
+            r_thresh: if self.complete_geometry() { 0.0 } else { self.r_thresh() },
+            beta: self.beta,
+            box_fit: self.box_fit,
+            crease_angle: self.crease_angle,
+            face_resolution: self.face_resolution,
+            seed: self.seed,
+        }
+    }
+
+    /// Parameters for [`radiosity::solve`].
+    pub fn radiosity_params(&self) -> RadiosityParams {
+        RadiosityParams {
+            patch_size: self.patch_size.unwrap_or(f32::INFINITY),
+            unshot: self.unshot,
+            direct: self.direct,
+            error: self.radiosity_error,
+            seed: self.seed,
+        }
+    }
+}

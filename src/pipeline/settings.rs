@@ -1,0 +1,167 @@
+//! All that a user can choose, independent of the command line.
+
+use std::f32::consts::PI;
+
+use serde::Serialize;
+use serde_json::{Map, Value, json};
+
+use crate::error::{Error, Result};
+use crate::radiosity::DirectLight;
+use crate::simplify::BoxFit;
+
+/// The paper's methods.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Method {
+    /// Radiosity on the simplified scene beyond `r_thresh`, path tracing within.
+    #[default]
+    Gsii,
+    /// Progressive multi-pass method: radiosity on the complete scene at every distance.
+    Pmm,
+    /// Monte Carlo path tracing: unbiased, the reference.
+    Mcpt,
+    /// The radiosity solution, shown directly.
+    Radiosity,
+}
+
+/// What radiosity is solved on, for `--method radiosity`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum GeometryKind {
+    /// Normal and simple surfaces.
+    #[default]
+    Ns,
+    /// Normal and complex surfaces.
+    Nc,
+}
+
+/// Ray-tracing libraries.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum BackendKind {
+    /// Embree 4.
+    #[default]
+    Embree,
+    /// obvhs: pure Rust, for validation.
+    Obvhs,
+}
+
+/// Settings of a run. `None` means: choose from the scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// Method.
+    pub method: Method,
+    /// Geometry of `Method::Radiosity`.
+    pub geometry: GeometryKind,
+    /// `r_thresh`, scene length units; 0 is PMM, infinity is MCPT.
+    pub r_thresh: Option<f32>,
+    /// The paper's beta, 0..=1.
+    pub beta: f32,
+    /// Box fit.
+    pub box_fit: BoxFit,
+    /// Largest angle between neighbouring triangles of one surface, radians.
+    pub crease_angle: f32,
+    /// Patches along each edge of a box face.
+    pub face_resolution: u32,
+    /// Target edge length of patches, scene length units.
+    pub patch_size: Option<f32>,
+    /// Share of emitted flux that may stay unshot.
+    pub unshot: f64,
+    /// How light sources light the patches.
+    pub direct: DirectLight,
+    /// Relative statistical error of the radiosity solution.
+    pub radiosity_error: f32,
+    /// Roughness under which a specular lobe counts as highly directional.
+    pub glossy_threshold: f32,
+    /// Scattering events after which paths end.
+    pub max_depth: u32,
+    /// Ray-tracing library.
+    pub backend: BackendKind,
+    /// Threads for the library's own work; 0 for all.
+    pub threads: usize,
+    /// Seed of everything random.
+    pub seed: u32,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Settings {
+            method: Method::Gsii,
+            geometry: GeometryKind::Ns,
+            r_thresh: None,
+            beta: 1.0 / (2.0 * PI),
+            box_fit: BoxFit::Flux,
+            crease_angle: 30.0_f32.to_radians(),
+            face_resolution: 2,
+            patch_size: None,
+            unshot: 0.01,
+            direct: DirectLight::Gather,
+            radiosity_error: 0.02,
+            glossy_threshold: 0.3,
+            max_depth: u32::MAX,
+            backend: BackendKind::Embree,
+            threads: 0,
+            seed: 0,
+        }
+    }
+}
+
+impl Settings {
+    /// `r_thresh`, after automatic choices were filled in.
+    pub fn r_thresh(&self) -> f32 {
+        self.r_thresh.unwrap_or(0.0)
+    }
+
+    /// Whether radiosity is solved on normal + complex surfaces.
+    pub fn complete_geometry(&self) -> bool {
+        match self.method {
+            Method::Pmm => true,
+            Method::Gsii => self.r_thresh() == 0.0,
+            Method::Radiosity => self.geometry == GeometryKind::Nc,
+            Method::Mcpt => false,
+        }
+    }
+
+    /// Refuses values without meaning.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] naming the option.
+    pub fn check(&self) -> Result<()> {
+        let refuse = |what: &str, why: &str| Err(Error::Usage(format!("{what} {why}")));
+        match self {
+            s if s.r_thresh.is_some_and(|r| r.is_nan() || r < 0.0) => {
+                refuse("--r-thresh", "must be a length, 0 or more (inf is allowed)")
+            }
+            s if !(0.0..=1.0).contains(&s.beta) => refuse("--beta", "must be between 0 and 1"),
+            s if s.patch_size.is_some_and(|p| p.is_nan() || p <= 0.0) => {
+                refuse("--patch-size", "must be a length above 0")
+            }
+            s if !(s.unshot > 0.0 && s.unshot <= 1.0) => refuse("--unshot", "must be above 0 and at most 1"),
+            s if s.face_resolution == 0 => refuse("face resolution", "must be at least 1"),
+            _ => Ok(()),
+        }
+    }
+
+    /// Everything needed to repeat the run, by option name.
+    pub fn parameters(&self) -> Map<String, Value> {
+        let length = |l: Option<f32>| l.map_or(Value::Null, |l| json!(if l.is_finite() { l } else { f32::MAX }));
+        let mut map = Map::new();
+        for (key, value) in [
+            ("method", json!(self.method)),
+            ("geometry", json!(self.geometry)),
+            ("r_thresh", length(self.r_thresh)),
+            ("beta", json!(self.beta)),
+            ("box", json!(self.box_fit)),
+            ("patch_size", length(self.patch_size)),
+            ("unshot", json!(self.unshot)),
+            ("radiosity_error", json!(self.radiosity_error)),
+            ("glossy_threshold", json!(self.glossy_threshold)),
+            ("max_depth", json!(self.max_depth)),
+            ("backend", json!(self.backend)),
+            ("seed", json!(self.seed)),
+        ] {
+            map.insert(key.to_owned(), value);
+        }
+        map
+    }
+}

@@ -1,0 +1,138 @@
+//! The bias meter: what the far field's approximations change, measured without knowing the answer.
+//!
+//! From the same first gather (same point, same direction) one path is followed with the far field and one without. The
+//! difference of the two is an unbiased sample of the bias of GSII at that point; its mean over random points of the image is the
+//! image's bias, with a standard error.
+
+use rayon::prelude::*;
+
+use super::integrator::{Workspace, World};
+use super::path::{Arrival, Path};
+use crate::sampling::{hash_all, sobol};
+use crate::scene::Camera;
+use glam::{Vec2, Vec3};
+
+/// Paths that are traced as one batch.
+const BATCH: u32 = 2048;
+
+/// Keeps the meter's random numbers apart from the image's.
+const STREAM: u32 = 0x6269_6173;
+
+/// Signed bias of the image's mean radiance: GSII less path traced, per band.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Bias {
+    /// Mean difference, W/(sr m^2).
+    pub mean: [f64; 3],
+    /// Standard error of that.
+    pub standard_error: [f64; 3],
+    /// Mean LORES radiance by path tracing, for comparison.
+    pub reference: [f64; 3],
+    /// Pairs of paths.
+    pub samples: u64,
+}
+
+impl Bias {
+    /// Bias over the mean radiance `total`, all bands together, and half of its 95 % confidence interval.
+    pub fn relative_to(&self, total: f64) -> (f64, f64) {
+        if total <= 0.0 {
+            return (0.0, 0.0);
+        }
+        let mean = self.mean.iter().sum::<f64>() / 3.0;
+        // Bands are strongly correlated: their mean has at most the mean of their standard errors.
+        let error = self.standard_error.iter().sum::<f64>() / 3.0;
+        (mean / total, 1.96 * error / total)
+    }
+}
+
+/// Measures the bias with `samples` pairs of paths over the whole image.
+pub fn measure(world: &World<'_>, camera: &Camera, aspect: f32, samples: u32, seed: u32) -> Bias {
+    let reference = World { far: None, ..*world };
+    let batches: Vec<Sums> = (0..samples.div_ceil(BATCH))
+        .into_par_iter()
+        .map_init(Workspace::default, |ws, batch| {
+            let first = batch * BATCH;
+            let count = BATCH.min(samples - first);
+            let stream = hash_all(&[seed, STREAM, batch]);
+            let views: Vec<Path> = (0..count).map(|i| view_path(camera, aspect, i, stream)).collect();
+            let gathers = world.first_gathers(ws, &views);
+            let mut with_far = ws.take_lores();
+            for (sum, value) in with_far.iter_mut().zip(world.gather(ws, &gathers, count as usize)) {
+                *sum += *value;
+            }
+            // Other random numbers than the first path's: only the first point and direction are shared.
+            let detailed: Vec<Path> = gathers
+                .iter()
+                .map(|g| Path { near: f32::INFINITY, stream: hash_all(&[g.stream, STREAM]), ..*g })
+                .collect();
+            let traced = reference.gather(ws, &detailed, count as usize);
+            let mut sums = Sums::default();
+            for (far, path) in with_far.iter().zip(traced) {
+                sums.add(*far, *path);
+            }
+            sums
+        })
+        .collect();
+    let total = batches.into_iter().fold(Sums::default(), Sums::merged);
+    total.bias()
+}
+
+fn view_path(camera: &Camera, aspect: f32, index: u32, stream: u32) -> Path {
+    let u = sobol(index, 0, stream);
+    Path {
+        ray: camera.ray(Vec2::new(u[0], u[1]), aspect),
+        throughput: Vec3::ONE,
+        near: f32::INFINITY,
+        arrival: Arrival::Sharp,
+        gathers: false,
+        depth: 0,
+        trial: index,
+        index,
+        stream,
+    }
+}
+
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    difference: [f64; 3],
+    square: [f64; 3],
+    reference: [f64; 3],
+    samples: u64,
+}
+
+impl Sums {
+    fn add(&mut self, far: Vec3, path: Vec3) {
+        if !(far.is_finite() && path.is_finite()) {
+            return;
+        }
+        for band in 0..3 {
+            let d = f64::from(far[band]) - f64::from(path[band]);
+            self.difference[band] += d;
+            self.square[band] += d * d;
+            self.reference[band] += f64::from(path[band]);
+        }
+        self.samples += 1;
+    }
+
+    fn merged(self, o: Sums) -> Sums {
+        let add = |a: [f64; 3], b: [f64; 3]| std::array::from_fn(|i| a[i] + b[i]);
+        Sums {
+            difference: add(self.difference, o.difference),
+            square: add(self.square, o.square),
+            reference: add(self.reference, o.reference),
+            samples: self.samples + o.samples,
+        }
+    }
+
+    fn bias(&self) -> Bias {
+        let n = self.samples.max(2) as f64;
+        let mean = self.difference.map(|d| d / n);
+        Bias {
+            mean,
+            standard_error: std::array::from_fn(|b| {
+                ((self.square[b] / n - mean[b] * mean[b]).max(0.0) / (n - 1.0)).sqrt()
+            }),
+            reference: self.reference.map(|r| r / n),
+            samples: self.samples,
+        }
+    }
+}

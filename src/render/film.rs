@@ -1,0 +1,241 @@
+//! Where trials are added up: mean and standard error per pixel, band and pass.
+
+use glam::Vec3;
+
+/// Pixels along each edge of a film tile.
+pub const TILE: u32 = 8;
+
+/// Running sums of one pass at one pixel, f64.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PixelSum {
+    sum: [f64; 3],
+    square: [f64; 3],
+    even: [f64; 3],
+    trials: u32,
+    even_trials: u32,
+}
+
+impl PixelSum {
+    /// Adds a trial. Trials with even and odd numbers come from independent scramblings.
+    pub fn add(&mut self, value: Vec3, even: bool) {
+        for (band, v) in value.to_array().map(f64::from).into_iter().enumerate() {
+            self.sum[band] += v;
+            self.square[band] += v * v;
+            if even {
+                self.even[band] += v;
+            }
+        }
+        self.trials += 1;
+        self.even_trials += u32::from(even);
+    }
+
+    /// Number of trials.
+    pub fn trials(&self) -> u32 {
+        self.trials
+    }
+
+    /// Mean radiance per band; zero without trials.
+    pub fn mean(&self) -> [f64; 3] {
+        let n = f64::from(self.trials.max(1));
+        self.sum.map(|s| s / n)
+    }
+
+    /// Variance of a single trial per band; zero with fewer than two trials.
+    pub fn variance(&self) -> [f64; 3] {
+        let n = f64::from(self.trials);
+        if self.trials < 2 {
+            return [0.0; 3];
+        }
+        std::array::from_fn(|b| ((self.square[b] - self.sum[b] * self.sum[b] / n) / (n - 1.0)).max(0.0))
+    }
+
+    /// The paper's `L_dev`: standard error of the mean as if trials were independent. They are better than that (stratified),
+    /// so this is an upper estimate.
+    pub fn dev(&self) -> [f64; 3] {
+        let n = f64::from(self.trials.max(1));
+        self.variance().map(|v| (v / n).sqrt())
+    }
+
+    /// Means of the even and of the odd trials, two independent estimates; `None` when one of them has no trial.
+    pub fn halves(&self) -> Option<([f64; 3], [f64; 3])> {
+        let odd_trials = self.trials - self.even_trials;
+        if self.even_trials == 0 || odd_trials == 0 {
+            return None;
+        }
+        let even = self.even.map(|s| s / f64::from(self.even_trials));
+        let odd = std::array::from_fn(|b| (self.sum[b] - self.even[b]) / f64::from(odd_trials));
+        Some((even, odd))
+    }
+}
+
+/// What the first visible surface looks like: of one trial, or summed over trials.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Feature {
+    /// Reflectance, all lobes.
+    pub albedo: Vec3,
+    /// Shading normal, world space.
+    pub normal: Vec3,
+    /// Distance along the view ray.
+    pub depth: f32,
+    /// Trials that hit something.
+    pub hits: u32,
+}
+
+impl std::ops::AddAssign for Feature {
+    fn add_assign(&mut self, o: Self) {
+        self.albedo += o.albedo;
+        self.normal += o.normal;
+        self.depth += o.depth;
+        self.hits += o.hits;
+    }
+}
+
+/// One pixel.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Pixel {
+    /// Emission, highly directional chains and direct light.
+    pub hires: PixelSum,
+    /// Indirect light.
+    pub lores: PixelSum,
+    /// The first visible surface.
+    pub feature: Feature,
+}
+
+/// A square of pixels that one thread works on at a time.
+#[derive(Clone, Debug)]
+pub struct Tile {
+    /// Left and top pixel.
+    pub origin: [u32; 2],
+    /// Width and height, at most [`TILE`].
+    pub size: [u32; 2],
+    /// Pixels row by row.
+    pub pixels: Vec<Pixel>,
+    /// Trials that were not finite and were dropped.
+    pub dropped: u64,
+}
+
+/// An image in the making.
+#[derive(Clone, Debug)]
+pub struct Film {
+    /// Width in pixels.
+    pub width: u32,
+    /// Height in pixels.
+    pub height: u32,
+    /// Tiles, row by row.
+    pub tiles: Vec<Tile>,
+}
+
+impl Film {
+    /// An empty film.
+    pub fn new(width: u32, height: u32) -> Self {
+        let mut tiles = Vec::new();
+        for y in (0..height).step_by(TILE as usize) {
+            for x in (0..width).step_by(TILE as usize) {
+                let size = [TILE.min(width - x), TILE.min(height - y)];
+                let pixels = vec![Pixel::default(); (size[0] * size[1]) as usize];
+                tiles.push(Tile { origin: [x, y], size, pixels, dropped: 0 });
+            }
+        }
+        Film { width, height, tiles }
+    }
+
+    /// Number of tiles in a row.
+    pub fn tiles_across(&self) -> usize {
+        self.width.div_ceil(TILE) as usize
+    }
+
+    /// All pixels row by row.
+    pub fn pixels(&self) -> impl Iterator<Item = &Pixel> {
+        let across = self.tiles_across();
+        (0..self.height).flat_map(move |y| {
+            (0..self.width).map(move |x| {
+                let tile = &self.tiles[(y / TILE) as usize * across + (x / TILE) as usize];
+                &tile.pixels[((y % TILE) * tile.size[0] + x % TILE) as usize]
+            })
+        })
+    }
+
+    /// Relative standard error of each pass over the whole image, and of their sum: root of the mean squared error over
+    /// the mean of `L^2 + (L_mean / 10)^2`, both measured from the two independent halves of all trials.
+    pub fn relative_errors(&self) -> ImageErrors {
+        let mean = self.mean(|p| add(p.hires.mean(), p.lores.mean()));
+        ImageErrors {
+            hires: self.relative_error(mean, |p| p.hires.halves()),
+            lores: self.relative_error(mean, |p| p.lores.halves()),
+            total: self.relative_error(mean, |p| {
+                let (h, l) = (p.hires.halves()?, p.lores.halves()?);
+                Some((add(h.0, l.0), add(h.1, l.1)))
+            }),
+        }
+    }
+
+    /// Mean over all pixels and bands of a value per pixel.
+    pub fn mean(&self, value: impl Fn(&Pixel) -> [f64; 3]) -> f64 {
+        let sum: f64 = self.pixels().map(|p| value(p).iter().sum::<f64>()).sum();
+        sum / (3.0 * f64::from(self.width) * f64::from(self.height))
+    }
+
+    /// Root of relMSE with the whole image's radiance in the denominator, as far as `halves` tells.
+    fn relative_error(&self, mean: f64, halves: impl Fn(&Pixel) -> Option<([f64; 3], [f64; 3])>) -> f64 {
+        let (mut sum, mut count) = (0.0, 0u64);
+        for pixel in self.pixels() {
+            let Some((a, b)) = halves(pixel) else { continue };
+            let total = add(pixel.hires.mean(), pixel.lores.mean());
+            for band in 0..3 {
+                // Var[(a+b)/2] = E[(a-b)^2] / 4 for independent halves of equal size.
+                let squared = 0.25 * (a[band] - b[band]).powi(2);
+                let scale = total[band].powi(2) + 0.01 * mean * mean;
+                if scale > 0.0 {
+                    sum += squared / scale;
+                }
+                count += 1;
+            }
+        }
+        (sum / (count.max(1) as f64)).sqrt()
+    }
+}
+
+/// Relative standard errors of an image, 0..; see [`Film::relative_errors`].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ImageErrors {
+    /// Of HIRES.
+    pub hires: f64,
+    /// Of LORES.
+    pub lores: f64,
+    /// Of the image.
+    pub total: f64,
+}
+
+fn add(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|i| a[i] + b[i])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn mean_and_standard_error_of_known_numbers() {
+        let mut sum = PixelSum::default();
+        for (i, v) in [1.0, 2.0, 3.0, 4.0].into_iter().enumerate() {
+            sum.add(Vec3::new(v, 0.0, -v), i % 2 == 0);
+        }
+        assert_eq!(sum.mean(), [2.5, 0.0, -2.5]);
+        let variance = 5.0 / 3.0;
+        assert!((sum.dev()[0] - f64::sqrt(variance / 4.0)).abs() < 1e-15);
+        assert_eq!(sum.halves().unwrap(), ([2.0, 0.0, -2.0], [3.0, 0.0, -3.0]));
+    }
+
+    #[test]
+    fn pixels_come_row_by_row_for_odd_sizes() {
+        let mut film = Film::new(19, 11);
+        for tile in &mut film.tiles {
+            for i in 0..tile.pixels.len() as u32 {
+                let (x, y) = (tile.origin[0] + i % tile.size[0], tile.origin[1] + i / tile.size[0]);
+                tile.pixels[i as usize].feature.hits = y * 19 + x;
+            }
+        }
+        let order: Vec<u32> = film.pixels().map(|p| p.feature.hits).collect();
+        assert_eq!(order, (0..19 * 11).collect::<Vec<_>>());
+    }
+}

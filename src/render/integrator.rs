@@ -1,0 +1,545 @@
+//! Both passes as one wavefront of paths: batches of rays are traced, shaded, and traced on.
+//!
+//! Which term of the paper's decomposition is computed where, each exactly once (E: eye, S: highly directional, D: weakly
+//! directional, L: light source):
+//!
+//! | term | path | computed by |
+//! |---|---|---|
+//! | emitted, `L_h` of light sources | `E S* L` | HIRES: emission at the end of the view chain |
+//! | `L_{l,s}` | `E S* D L` | HIRES: next-event estimation; a glossy lobe shares it with its own rays (balance heuristic) |
+//! | `L_{l,l}` beyond `r_thresh` | `E S* D .. D` | LORES: radiosity less emission of the patch that is hit, Eq. (3) first part |
+//! | `L_{l,l}` within `r_thresh` | `E S* D D ..` | LORES: direct light at the near point and the same gather again, Eq. (3) second part |
+//! | `L_{l,h}` | `E S* D S+ D ..` | LORES: the gather ray goes on through mirrors and glass |
+//! | `L_{l,c}` | `E S* D S+ L` | LORES: emission met after at least one highly directional event |
+//!
+//! Light that passes straight through panes counts as direct (`L_{l,s}`): shadow rays take the panes' transmittance.
+
+use std::f32::consts::FRAC_1_PI;
+use std::time::{Duration, Instant};
+
+use glam::{Vec2, Vec3};
+
+use super::film::{Feature, Tile};
+use super::nearness::Nearness;
+use super::path::{Arrival, Passes, Path, Shadow};
+use crate::backend::{Coherence, Hit, Ray, RayScene, Visible};
+use crate::lighting::{Lights, shadow};
+use crate::radiosity::Solution;
+use crate::sampling::{hash_all, sobol};
+use crate::scene::{Camera, Scene};
+use crate::shading::{Bsdf, SurfacePoint};
+use crate::simplify::{SimplifiedGeometry, TriangleSource};
+
+/// Distance that shadow rays stop short of the light, relative: covers the rounding of an intersection with the light's own
+/// triangle.
+const SHADOW_MARGIN: f32 = 1.0 / 8192.0;
+
+/// A far ray starts this much (relative) before the near one ended, so that nothing falls between the two.
+const SEAM: f32 = 4.0 * f32::EPSILON;
+
+/// Weakly directional bounces after which paths play Russian roulette.
+const ROULETTE_DEPTH: u32 = 3;
+
+/// Random numbers of one path: one block of four for the camera, then two for each scattering event.
+const BLOCKS_PER_EVENT: u32 = 2;
+
+/// Everything that does not change while an image is rendered.
+#[derive(Clone, Copy)]
+pub struct World<'a> {
+    /// Geometry and materials.
+    pub scene: &'a Scene,
+    /// Light sources.
+    pub lights: &'a Lights,
+    /// Normal and complex surfaces.
+    pub detailed: &'a dyn RayScene,
+    /// Whether the detailed scene has surfaces that transmit without bending.
+    pub has_panes: bool,
+    /// The far field; without one all light is path traced (MCPT).
+    pub far: Option<FarField<'a>>,
+    /// Roughness under which a specular lobe counts as highly directional.
+    pub glossy_threshold: f32,
+    /// Scattering events after which paths end.
+    pub max_depth: u32,
+}
+
+/// Where radiance beyond `r_thresh` comes from.
+#[derive(Clone, Copy)]
+pub struct FarField<'a> {
+    /// Normal and simple surfaces (or normal and complex: PMM).
+    pub rays: &'a dyn RayScene,
+    /// The same as triangles.
+    pub geometry: &'a SimplifiedGeometry,
+    /// Radiosities of their patches.
+    pub solution: &'a Solution,
+    /// Mean length of a gather ray's near part; 0 for PMM.
+    pub r_thresh: f32,
+    /// Where near parts need the detailed scene; `None` when the geometry is complete.
+    pub nearness: Option<&'a Nearness>,
+}
+
+/// Rays traced, by purpose.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RayCounts {
+    /// Camera rays and their highly directional chains.
+    pub view: u64,
+    /// Near parts of gather rays, in the detailed scene.
+    pub near: u64,
+    /// Far parts of gather rays, in the simplified scene.
+    pub far: u64,
+    /// Shadow rays at points seen by the camera.
+    pub shadow_hires: u64,
+    /// Shadow rays at points that gather rays hit.
+    pub shadow_lores: u64,
+}
+
+impl RayCounts {
+    /// Rays of the HIRES pass.
+    pub fn hires(&self) -> u64 {
+        self.view + self.shadow_hires
+    }
+
+    /// Rays of the LORES pass.
+    pub fn lores(&self) -> u64 {
+        self.near + self.far + self.shadow_lores
+    }
+}
+
+impl std::ops::AddAssign for RayCounts {
+    fn add_assign(&mut self, o: Self) {
+        self.view += o.view;
+        self.near += o.near;
+        self.far += o.far;
+        self.shadow_hires += o.shadow_hires;
+        self.shadow_lores += o.shadow_lores;
+    }
+}
+
+/// Time spent in the two passes. A round of view rays with its shadow rays is HIRES, the rounds after it are LORES.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PassTimes {
+    /// In HIRES.
+    pub hires: Duration,
+    /// In LORES.
+    pub lores: Duration,
+}
+
+impl PassTimes {
+    /// The same shares of another total.
+    pub fn scaled_to(self, total: Duration) -> PassTimes {
+        let sum = (self.hires + self.lores).as_secs_f64();
+        let share = if sum > 0.0 { self.hires.as_secs_f64() / sum } else { 0.0 };
+        let hires = total.mul_f64(share);
+        PassTimes { hires, lores: total - hires }
+    }
+}
+
+impl std::ops::AddAssign for PassTimes {
+    fn add_assign(&mut self, o: Self) {
+        self.hires += o.hires;
+        self.lores += o.lores;
+    }
+}
+
+/// Buffers of one thread, reused from batch to batch.
+#[derive(Default)]
+pub struct Workspace {
+    paths: Vec<Path>,
+    next: Vec<Path>,
+    /// Indices into `paths` of the rays in `rays`.
+    traced: Vec<u32>,
+    rays: Vec<Ray>,
+    hits: Vec<Hit>,
+    far: Vec<u32>,
+    shadows: Vec<Shadow>,
+    shadow_rays: Vec<Ray>,
+    occluded: Vec<bool>,
+    transmittance: Vec<Vec3>,
+    hires: Vec<Vec3>,
+    lores: Vec<Vec3>,
+    /// What view rays meet first, one a trial; empty when nobody wants to know.
+    features: Vec<Feature>,
+    /// Rays traced since this was last reset.
+    pub counts: RayCounts,
+    /// Time spent since this was last reset.
+    pub times: PassTimes,
+}
+
+/// A batch of trials of one tile.
+#[derive(Clone, Copy, Debug)]
+pub struct Batch {
+    /// Number of the first trial.
+    pub first: u32,
+    /// Number of trials for each pixel.
+    pub trials: u32,
+    /// Passes to feed.
+    pub passes: Passes,
+    /// Seed; pilots use another one than the image.
+    pub seed: u32,
+}
+
+impl<'a> World<'a> {
+    /// Adds a batch of trials to a tile.
+    pub fn render_tile(
+        &self,
+        ws: &mut Workspace,
+        camera: &Camera,
+        image_size: [u32; 2],
+        batch: Batch,
+        features: bool,
+        tile: &mut Tile,
+    ) {
+        let pixels = tile.pixels.len();
+        let trials = pixels * batch.trials as usize;
+        ws.start(trials);
+        let size = Vec2::new(image_size[0] as f32, image_size[1] as f32);
+        let aspect = size.x / size.y;
+        for (i, _) in tile.pixels.iter().enumerate() {
+            let x = tile.origin[0] + i as u32 % tile.size[0];
+            let y = tile.origin[1] + i as u32 / tile.size[0];
+            for t in 0..batch.trials {
+                let number = batch.first + t;
+                // Even and odd trials come from two independent scramblings, so that their difference measures the error.
+                let stream = hash_all(&[y * image_size[0] + x, number & 1, batch.seed]);
+                let index = number >> 1;
+                let u = sobol(index, 0, stream);
+                let film = (Vec2::new(x as f32, y as f32) + Vec2::new(u[0], u[1])) / size;
+                ws.paths.push(Path {
+                    ray: camera.ray(film, aspect),
+                    throughput: Vec3::ONE,
+                    near: f32::INFINITY,
+                    arrival: Arrival::Sharp,
+                    gathers: false,
+                    depth: 0,
+                    trial: i as u32 * batch.trials + t,
+                    index,
+                    stream,
+                });
+            }
+        }
+        ws.features.clear();
+        if features {
+            ws.features.resize(trials, Feature::default());
+        }
+        self.run(ws, batch.passes, None);
+        for (i, pixel) in tile.pixels.iter_mut().enumerate() {
+            for t in 0..batch.trials {
+                let trial = i * batch.trials as usize + t as usize;
+                let (h, l) = (ws.hires[trial], ws.lores[trial]);
+                if !(h.is_finite() && l.is_finite()) {
+                    tile.dropped += 1;
+                    continue;
+                }
+                let even = (batch.first + t) & 1 == 0;
+                if let Some(feature) = ws.features.get(trial) {
+                    pixel.feature += *feature;
+                }
+                if batch.passes.hires {
+                    pixel.hires.add(h, even);
+                }
+                if batch.passes.lores {
+                    pixel.lores.add(l, even);
+                }
+            }
+        }
+    }
+
+    /// Follows view chains to their first weakly directional bounce and returns the gather paths that start there.
+    /// Sums of the trials are left in the workspace.
+    pub(super) fn first_gathers(&self, ws: &mut Workspace, paths: &[Path]) -> Vec<Path> {
+        ws.start(paths.len());
+        ws.paths.extend_from_slice(paths);
+        let mut captured = Vec::with_capacity(paths.len());
+        self.run(ws, Passes::LORES, Some(&mut captured));
+        captured
+    }
+
+    /// Runs gather paths to their end and returns the LORES radiance of each trial.
+    pub(super) fn gather<'w>(&self, ws: &'w mut Workspace, paths: &[Path], trials: usize) -> &'w [Vec3] {
+        ws.start(trials);
+        ws.paths.extend_from_slice(paths);
+        self.run(ws, Passes::LORES, None);
+        &ws.lores
+    }
+
+    /// Traces and shades until all paths have ended. With `capture`, paths end when they start to gather.
+    fn run(&self, ws: &mut Workspace, passes: Passes, mut capture: Option<&mut Vec<Path>>) {
+        let mut coherence = Coherence::Coherent;
+        while !ws.paths.is_empty() {
+            let start = Instant::now();
+            ws.next.clear();
+            ws.shadows.clear();
+            ws.shadow_rays.clear();
+            self.trace_detailed(ws, passes, coherence, &mut capture);
+            self.trace_far(ws, passes, &mut capture);
+            self.trace_shadows(ws, coherence);
+            std::mem::swap(&mut ws.paths, &mut ws.next);
+            let view = coherence == Coherence::Coherent && passes.hires;
+            *(if view { &mut ws.times.hires } else { &mut ws.times.lores }) += start.elapsed();
+            coherence = Coherence::Incoherent;
+        }
+    }
+
+    /// Traces all rays that must meet the detailed scene first; what misses there goes on the list for the far field.
+    fn trace_detailed(
+        &self,
+        ws: &mut Workspace,
+        passes: Passes,
+        coherence: Coherence,
+        capture: &mut Option<&mut Vec<Path>>,
+    ) {
+        ws.traced.clear();
+        ws.rays.clear();
+        ws.far.clear();
+        for (i, path) in ws.paths.iter().enumerate() {
+            let same = |far: &FarField| far.nearness.is_none_or(|n| !n.differs(path.ray.origin));
+            if path.near.is_finite() && self.far.as_ref().is_some_and(|far| path.near <= 0.0 || same(far)) {
+                ws.far.push(i as u32);
+            } else {
+                ws.traced.push(i as u32);
+                ws.rays.push(Ray { t_far: path.near, ..path.ray });
+                if path.gathers {
+                    ws.counts.near += 1;
+                } else {
+                    ws.counts.view += 1;
+                }
+            }
+        }
+        ws.hits.resize(ws.rays.len(), Hit::MISS);
+        self.detailed.closest(&ws.rays, Visible::All, coherence, &mut ws.hits);
+        for k in 0..ws.traced.len() {
+            let (index, hit) = (ws.traced[k], ws.hits[k]);
+            if hit.is_hit() {
+                self.shade(ws, index, &hit, None, passes, capture);
+            } else if ws.paths[index as usize].near.is_finite() {
+                // The rest of the ray meets the simplified scene.
+                let path = &mut ws.paths[index as usize];
+                path.ray.t_near = path.near * (1.0 - SEAM);
+                ws.far.push(index);
+            }
+        }
+    }
+
+    /// Traces the far list in the simplified scene and looks radiosities up.
+    fn trace_far(&self, ws: &mut Workspace, passes: Passes, capture: &mut Option<&mut Vec<Path>>) {
+        let Some(far) = self.far else { return };
+        if ws.far.is_empty() {
+            return;
+        }
+        ws.rays.clear();
+        ws.rays.extend(ws.far.iter().map(|&i| ws.paths[i as usize].ray));
+        ws.hits.resize(ws.rays.len(), Hit::MISS);
+        far.rays.closest(&ws.rays, Visible::All, Coherence::Incoherent, &mut ws.hits);
+        ws.counts.far += ws.rays.len() as u64;
+        for k in 0..ws.far.len() {
+            let (index, hit) = (ws.far[k], ws.hits[k]);
+            if hit.is_hit() {
+                self.meet_far(ws, &far, index, &hit, passes, capture);
+            }
+        }
+    }
+
+    /// A gather ray met the simplified scene.
+    fn meet_far(
+        &self,
+        ws: &mut Workspace,
+        far: &FarField,
+        index: u32,
+        hit: &Hit,
+        passes: Passes,
+        capture: &mut Option<&mut Vec<Path>>,
+    ) {
+        let path = &ws.paths[index as usize];
+        let TriangleSource::Scene { triangle } = far.geometry.sources[hit.triangle as usize] else {
+            let radiosity = far.solution.radiosity(hit.triangle, hit.u, hit.v, true);
+            ws.lores[path.trial as usize] += path.throughput * radiosity * FRAC_1_PI;
+            return;
+        };
+        // Within reach, and where the patch is large against the ray, the surface's own light is worked out; the
+        // triangle is the same one in the detailed scene.
+        let near = hit.t <= path.near
+            || (far.r_thresh > 0.0 && far.solution.patch_diameter(hit.triangle, hit.u, hit.v) > hit.t);
+        let look_up = (!near).then_some(hit.triangle);
+        self.shade(ws, index, &Hit { triangle, ..*hit }, look_up, passes, capture);
+    }
+
+    /// A ray met a surface of the scene. `look_up`: what is weakly directional there comes from the radiosity of this triangle
+    /// of the simplified geometry.
+    fn shade(
+        &self,
+        ws: &mut Workspace,
+        index: u32,
+        hit: &Hit,
+        look_up: Option<u32>,
+        passes: Passes,
+        capture: &mut Option<&mut Vec<Path>>,
+    ) {
+        let path = ws.paths[index as usize];
+        let trial = path.trial as usize;
+        let point = SurfacePoint::new(self.scene, hit);
+        let outgoing = -path.ray.direction;
+        let front = point.geometric_normal.dot(outgoing) > 0.0;
+        let bsdf = Bsdf::new(self.scene, &point, outgoing, self.glossy_threshold);
+
+        let emission = bsdf.emission();
+        if emission != Vec3::ZERO {
+            let radiance = path.throughput * emission * self.emission_share(&path, hit);
+            let sum = if path.gathers { &mut ws.lores[trial] } else { &mut ws.hires[trial] };
+            *sum += radiance;
+        }
+        let (low, high) = (bsdf.albedo_low(), bsdf.albedo_high());
+        if path.depth == 0
+            && let Some(feature) = ws.features.get_mut(trial)
+        {
+            let normal = if front { point.shading_normal } else { -point.shading_normal };
+            *feature = Feature { albedo: low + high, normal, depth: hit.t, hits: 1 };
+        }
+        if path.depth >= self.max_depth {
+            return;
+        }
+
+        let block = 1 + path.depth * BLOCKS_PER_EVENT;
+        let lights = sobol(path.index, block, path.stream);
+        let facing = if front { point.shading_normal } else { -point.shading_normal };
+        let wanted = if path.gathers { passes.lores } else { passes.hires };
+        if look_up.is_none() && wanted {
+            self.sample_lights(ws, &path, &point, facing, &bsdf, [lights[0], lights[1], lights[2]]);
+        }
+
+        let u = sobol(path.index, block + 1, path.stream);
+        let choose_high = choose_high(low, high);
+        if u[3] < choose_high {
+            let Some(sample) = bsdf.sample_high([u[0], u[1], u[2]]) else { return };
+            let arrival = match (sample.straight, sample.pdf) {
+                (true, _) => path.arrival,
+                (false, None) => Arrival::Sharp,
+                (false, Some(pdf)) => Arrival::Glossy { pdf, position: point.position, normal: facing },
+            };
+            ws.next.push(Path {
+                ray: Ray::new(point.ray_origin(sample.direction), sample.direction),
+                throughput: path.throughput * sample.weight / choose_high,
+                near: if path.near.is_finite() { (path.near - hit.t).max(0.0) } else { path.near },
+                arrival,
+                depth: path.depth + 1,
+                ..path
+            });
+            return;
+        }
+        let throughput = path.throughput / (1.0 - choose_high);
+        if let (Some(triangle), Some(far)) = (look_up, &self.far) {
+            let radiosity = far.solution.radiosity(triangle, hit.u, hit.v, front);
+            ws.lores[trial] += throughput * radiosity * FRAC_1_PI;
+            return;
+        }
+        if !passes.lores || low == Vec3::ZERO {
+            return;
+        }
+        let Some(sample) = bsdf.sample_low([u[0], u[1], u[2]]) else { return };
+        let mut next = Path {
+            ray: Ray::new(point.ray_origin(sample.direction), sample.direction),
+            throughput: throughput * sample.weight,
+            near: self.far.map_or(f32::INFINITY, |far| far.r_thresh * (0.5 + lights[3])),
+            arrival: Arrival::Soft,
+            gathers: true,
+            depth: path.depth + 1,
+            ..path
+        };
+        if next.depth >= ROULETTE_DEPTH {
+            let survival = next.throughput.max_element().min(1.0);
+            let rescaled = (u[3] - choose_high) / (1.0 - choose_high);
+            if rescaled >= survival {
+                return;
+            }
+            next.throughput /= survival;
+        }
+        match (path.gathers, capture) {
+            (false, Some(captured)) => captured.push(next),
+            _ => ws.next.push(next),
+        }
+    }
+
+    /// Share of met emission that counts: the rest is next-event estimation's at the start of the ray.
+    fn emission_share(&self, path: &Path, hit: &Hit) -> f32 {
+        match path.arrival {
+            Arrival::Sharp => 1.0,
+            Arrival::Soft => 0.0,
+            Arrival::Glossy { pdf, position, normal } => {
+                let distance = position.distance(path.ray.at(hit.t));
+                let direction = path.ray.direction;
+                let light = self.lights.pdf(self.scene, position, normal, direction, distance, hit.triangle);
+                pdf / (pdf + light)
+            }
+        }
+    }
+
+    /// Next-event estimation: one shadow ray to one light source.
+    fn sample_lights(
+        &self,
+        ws: &mut Workspace,
+        path: &Path,
+        point: &SurfacePoint,
+        normal: Vec3,
+        bsdf: &Bsdf,
+        u: [f32; 3],
+    ) {
+        let Some(light) = self.lights.sample(self.scene, point.position, normal, u) else { return };
+        let (high, high_pdf) = bsdf.eval_high(light.direction);
+        let high_share = light.pdf.map_or(1.0, |pdf| pdf / (pdf + high_pdf));
+        let scattered = bsdf.eval_low(light.direction) + high * high_share;
+        let radiance = path.throughput * scattered * light.weight;
+        if radiance == Vec3::ZERO {
+            return;
+        }
+        let t_far = light.distance * (1.0 - SHADOW_MARGIN);
+        ws.shadow_rays.push(Ray { t_far, ..Ray::new(point.ray_origin(light.direction), light.direction) });
+        ws.shadows.push(Shadow { radiance, trial: path.trial, gathers: path.gathers });
+    }
+
+    /// Traces all shadow rays of the round and adds what arrives.
+    fn trace_shadows(&self, ws: &mut Workspace, coherence: Coherence) {
+        let n = ws.shadow_rays.len();
+        if self.has_panes {
+            ws.transmittance.resize(n, Vec3::ZERO);
+            shadow::visibility(self.detailed, self.scene, None, &ws.shadow_rays, &mut ws.transmittance);
+        } else {
+            ws.occluded.resize(n, false);
+            self.detailed.occluded(&ws.shadow_rays, Visible::All, coherence, &mut ws.occluded);
+        }
+        for (i, s) in ws.shadows.iter().enumerate() {
+            let share = if self.has_panes { ws.transmittance[i] } else { Vec3::splat(f32::from(!ws.occluded[i])) };
+            let sum = if s.gathers { &mut ws.lores } else { &mut ws.hires };
+            sum[s.trial as usize] += s.radiance * share;
+            if s.gathers {
+                ws.counts.shadow_lores += 1;
+            } else {
+                ws.counts.shadow_hires += 1;
+            }
+        }
+    }
+}
+
+impl Workspace {
+    /// LORES sums of the last batch.
+    pub(super) fn take_lores(&mut self) -> Vec<Vec3> {
+        std::mem::take(&mut self.lores)
+    }
+
+    /// Forgets the last batch and makes room for the sums of `trials` trials.
+    fn start(&mut self, trials: usize) {
+        self.paths.clear();
+        self.features.clear();
+        for sums in [&mut self.hires, &mut self.lores] {
+            sums.clear();
+            sums.resize(trials, Vec3::ZERO);
+        }
+    }
+}
+
+/// Probability of going on along the highly directional part. Square roots keep weak but sharp reflections of light sources
+/// from being rare and bright.
+fn choose_high(low: Vec3, high: Vec3) -> f32 {
+    if high == Vec3::ZERO {
+        return 0.0;
+    }
+    let (l, h) = (low.element_sum().sqrt(), high.element_sum().sqrt());
+    h / (l + h)
+}

@@ -1,0 +1,115 @@
+//! From a film to an image with named channels.
+
+use std::str::FromStr;
+
+use glam::Vec3;
+
+use super::film::{Film, Pixel};
+use crate::image::Image;
+
+/// What can be written beside the image itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Layer {
+    /// HIRES radiance.
+    Hires,
+    /// LORES radiance.
+    Lores,
+    /// Standard error of HIRES.
+    HiresDev,
+    /// Standard error of LORES.
+    LoresDev,
+    /// Reflectance of the first visible surface.
+    Albedo,
+    /// Its shading normal, world space.
+    Normal,
+    /// Its distance.
+    Depth,
+    /// Trials of both passes.
+    Trials,
+}
+
+impl Layer {
+    /// All of them, in the order in which they are written.
+    pub const ALL: [Layer; 8] = [
+        Layer::Hires,
+        Layer::Lores,
+        Layer::HiresDev,
+        Layer::LoresDev,
+        Layer::Albedo,
+        Layer::Normal,
+        Layer::Depth,
+        Layer::Trials,
+    ];
+
+    /// Name on the command line and in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Layer::Hires => "hires",
+            Layer::Lores => "lores",
+            Layer::HiresDev => "hires_dev",
+            Layer::LoresDev => "lores_dev",
+            Layer::Albedo => "albedo",
+            Layer::Normal => "normal",
+            Layer::Depth => "depth",
+            Layer::Trials => "trials",
+        }
+    }
+
+    /// Whether the renderer must record features for it.
+    pub fn is_feature(self) -> bool {
+        matches!(self, Layer::Albedo | Layer::Normal | Layer::Depth)
+    }
+}
+
+impl FromStr for Layer {
+    type Err = String;
+
+    fn from_str(s: &str) -> Result<Self, String> {
+        Layer::ALL.into_iter().find(|l| l.name() == s).ok_or_else(|| {
+            let names: Vec<_> = Layer::ALL.iter().map(|l| l.name()).collect();
+            format!("no layer '{s}'; there are {}", names.join(", "))
+        })
+    }
+}
+
+/// The image `HIRES + LORES` in `R,G,B`, and layers beside it.
+pub fn develop(film: &Film, layers: &[Layer]) -> Image {
+    let mut image = Image::new(film.width, film.height);
+    let rgb = |value: &dyn Fn(&Pixel) -> Vec3| film.pixels().map(value).collect::<Vec<_>>();
+    let scalar = |value: &dyn Fn(&Pixel) -> f32| film.pixels().map(value).collect::<Vec<_>>();
+    image.push_rgb("", &rgb(&|p| sum(p.hires.mean(), p.lores.mean())));
+    for layer in layers {
+        let name = layer.name();
+        match layer {
+            Layer::Hires => image.push_rgb(name, &rgb(&|p| vec3(p.hires.mean()))),
+            Layer::Lores => image.push_rgb(name, &rgb(&|p| vec3(p.lores.mean()))),
+            Layer::HiresDev => image.push_rgb(name, &rgb(&|p| vec3(p.hires.dev()))),
+            Layer::LoresDev => image.push_rgb(name, &rgb(&|p| vec3(p.lores.dev()))),
+            Layer::Albedo => image.push_rgb(name, &rgb(&|p| p.feature.albedo / p.hires.trials().max(1) as f32)),
+            Layer::Normal => {
+                let normals = rgb(&|p| p.feature.normal.normalize_or_zero());
+                for (axis, letter) in ["X", "Y", "Z"].into_iter().enumerate() {
+                    image.push(format!("{name}.{letter}"), normals.iter().map(|n| n[axis]).collect());
+                }
+            }
+            // Depth of the background is infinite, as compositing tools expect.
+            Layer::Depth => image.push("depth.Z", scalar(&|p| match p.feature.hits {
+                0 => f32::INFINITY,
+                hits => p.feature.depth / hits as f32,
+            })),
+            Layer::Trials => {
+                image.push("trials.hires", scalar(&|p| p.hires.trials() as f32));
+                image.push("trials.lores", scalar(&|p| p.lores.trials() as f32));
+            }
+        }
+    }
+    image
+}
+
+fn vec3(v: [f64; 3]) -> Vec3 {
+    Vec3::from_array(v.map(|x| x as f32))
+}
+
+fn sum(a: [f64; 3], b: [f64; 3]) -> Vec3 {
+    vec3(std::array::from_fn(|i| a[i] + b[i]))
+}

@@ -1,0 +1,77 @@
+//! The state of one path between two batches of rays.
+
+use glam::Vec3;
+
+use crate::backend::Ray;
+
+/// Which passes a batch of trials feeds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Passes {
+    /// Emission, highly directional chains and direct light.
+    pub hires: bool,
+    /// Indirect light.
+    pub lores: bool,
+}
+
+impl Passes {
+    /// Both from the same view rays.
+    pub const BOTH: Passes = Passes { hires: true, lores: true };
+    /// Only HIRES.
+    pub const HIRES: Passes = Passes { hires: true, lores: false };
+    /// Only LORES.
+    pub const LORES: Passes = Passes { hires: false, lores: true };
+}
+
+/// How the current ray of a path came to be: decides whether emission that it meets was already counted by next-event
+/// estimation at the ray's start.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Arrival {
+    /// From the camera, a mirror or refracting glass: emission counts in full.
+    Sharp,
+    /// From a glossy lobe with this density: emission is weighted against next-event estimation (balance heuristic).
+    Glossy {
+        /// Density per solid angle with which the direction was sampled.
+        pdf: f32,
+        /// Where the lobe was sampled.
+        position: Vec3,
+        /// Shading normal there, on the lit side.
+        normal: Vec3,
+    },
+    /// From a weakly directional lobe: next-event estimation has all of it.
+    Soft,
+}
+
+/// One path.
+#[derive(Clone, Copy, Debug)]
+pub struct Path {
+    /// The ray to trace next.
+    pub ray: Ray,
+    /// What the radiance that this ray brings is multiplied with.
+    pub throughput: Vec3,
+    /// Rest of the distance over which the ray meets the detailed scene: infinite for view rays and path tracing, r_thresh
+    /// (randomised, less what the path already went since its last weakly directional bounce) for gather rays.
+    pub near: f32,
+    /// How the ray came to be.
+    pub arrival: Arrival,
+    /// Whether a weakly directional bounce lies behind: the path belongs to LORES.
+    pub gathers: bool,
+    /// Scattering events so far.
+    pub depth: u32,
+    /// Index of the trial in its batch.
+    pub trial: u32,
+    /// Number of the trial within its stream.
+    pub index: u32,
+    /// Stream of random numbers.
+    pub stream: u32,
+}
+
+/// A shadow ray and what it brings when nothing is in its way.
+#[derive(Clone, Copy, Debug)]
+pub struct Shadow {
+    /// Radiance to add to the trial.
+    pub radiance: Vec3,
+    /// Index of the trial in its batch.
+    pub trial: u32,
+    /// Whether it goes to LORES.
+    pub gathers: bool,
+}

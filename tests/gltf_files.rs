@@ -1,0 +1,102 @@
+//! Real and hostile glTF files, where they are at hand: `../shared/scenes` beside the project, or `GSII_SCENES`.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use gsii::scene::{LoadOptions, Scene, load};
+use serde::Deserialize;
+
+/// The folder of test scenes; says so on standard output and gives `None` where it is absent.
+fn scenes() -> Option<PathBuf> {
+    let folder = match std::env::var_os("GSII_SCENES") {
+        Some(folder) => PathBuf::from(folder),
+        None => PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/scenes"),
+    };
+    if folder.is_dir() {
+        return Some(folder);
+    }
+    println!("skipped: no test scenes at {}", folder.display());
+    None
+}
+
+#[derive(Deserialize)]
+struct Case {
+    file: String,
+    expect: String,
+    triangles: Option<usize>,
+    bounds: Option<[[f64; 3]; 2]>,
+}
+
+/// What is wrong with a scene that should have loaded as listed; `None` if nothing.
+fn difference(scene: &Scene, case: &Case) -> Option<String> {
+    let notes = &scene.notes;
+    let dropped = notes.degenerate_triangles + notes.duplicate_triangles + notes.non_finite_triangles;
+    let triangles = scene.mesh.triangles.len() + dropped;
+    if Some(triangles) != case.triangles {
+        return Some(format!("{triangles} triangles instead of {:?}", case.triangles));
+    }
+    let [min, max] = case.bounds?;
+    let ours = [scene.mesh.bounds.min, scene.mesh.bounds.max].map(|p| (p.as_dvec3() + scene.centre).to_array());
+    let size = (0..3).map(|i| max[i] - min[i]).fold(0.0, f64::max);
+    for (ours, theirs) in ours.into_iter().flatten().zip(min.into_iter().chain(max)) {
+        if (ours - theirs).abs() > 1e-3 * size {
+            return Some(format!("bounds {ours} instead of {theirs}"));
+        }
+    }
+    None
+}
+
+#[test]
+fn edge_cases_behave_as_listed() {
+    let Some(folder) = scenes() else { return };
+    let table = std::fs::read_to_string(folder.join("edge.json")).unwrap();
+    let cases: Vec<Case> = serde_json::from_str(&table).unwrap();
+    let mut wrong = Vec::new();
+    for case in &cases {
+        let result = load(&folder.join(&case.file), &LoadOptions::default());
+        let verdict = match (&result, case.expect.as_str()) {
+            (Ok(scene), "load") => difference(scene, case),
+            (Err(error), "load") => Some(format!("refused: {error}")),
+            (Ok(_), "refuse") => Some("loaded".into()),
+            (Err(error), "refuse") if error.to_string().len() < case.file.len() + 10 => Some("no reason given".into()),
+            _ => None,
+        };
+        match &result {
+            Ok(scene) => {
+                println!("{}: {} triangles {:?}", case.file, scene.mesh.triangles.len(), scene.notes)
+            }
+            Err(error) => println!("{} ({}): {error}", case.file, case.expect),
+        }
+        wrong.extend(verdict.map(|v| format!("{}: {v}", case.file)));
+    }
+    println!("{} of {} edge cases behave as listed", cases.len() - wrong.len(), cases.len());
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+#[test]
+fn real_scenes_load() {
+    let Some(folder) = scenes() else { return };
+    let mut files: Vec<PathBuf> = std::fs::read_dir(&folder).unwrap().map(|f| f.unwrap().path()).collect();
+    files.retain(|f| f.extension().is_some_and(|e| e == "glb"));
+    files.sort();
+    assert!(!files.is_empty());
+    for file in files {
+        let start = Instant::now();
+        let scene = load(&file, &LoadOptions::default()).unwrap();
+        println!(
+            "{}: {} triangles, {} objects, {} materials, {} textures, {} cameras, {} lights, parts {:?}, {:.2} s, {:?}",
+            file.display(),
+            scene.mesh.triangles.len(),
+            scene.mesh.objects.len(),
+            scene.materials.len(),
+            scene.textures.len(),
+            scene.cameras.len(),
+            scene.lights.len(),
+            scene.mesh.parts().iter().map(|p| (p.kind, p.triangles.len())).collect::<Vec<_>>(),
+            start.elapsed().as_secs_f64(),
+            scene.notes
+        );
+        assert!(scene.cameras.iter().all(|c| c.name != "overview"), "{} has cameras of its own", file.display());
+        assert!(scene.materials.iter().any(|m| m.is_emitter()), "{} has emitters", file.display());
+    }
+}
