@@ -76,7 +76,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             s.clusters.len(),
             dropped,
             s.geometry.triangles.len(),
-            i().sum::<f32>() / n,
+            i().fold(0.0, |a, b| a + b) / n,
             i().fold(0.0, f32::max),
             c,
             s.rays,

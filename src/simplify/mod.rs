@@ -137,7 +137,7 @@ pub struct FitResidual {
     pub hit_share: f32,
     /// Intercepted flux of the box over that of the cluster, minus 1.
     pub intercepted: f32,
-    /// Standard error of `intercepted`.
+    /// Standard error of `intercepted`; infinite when no line hit the cluster, so that nothing is known.
     pub intercepted_error: f32,
     /// Mean reflected colour of the box minus that of the cluster.
     pub reflected: Vec3,

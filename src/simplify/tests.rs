@@ -11,7 +11,7 @@ use super::testing::*;
 use super::*;
 use crate::backend::PartKind;
 use crate::sampling;
-use crate::scene::Material;
+use crate::scene::{Alpha, Material};
 
 /// The paper's beta: `A_thresh = r_thresh^2`.
 const PAPER_BETA: f32 = 0.5 * FRAC_1_PI;
@@ -257,6 +257,25 @@ fn a_box_never_replaces_something_simpler() {
     };
     assert_eq!(with(6), (0, 12 + 12));
     assert_eq!(with(7), (1, 12 + 12));
+}
+
+#[test]
+fn clusters_that_rays_pass_through_stay_finite() {
+    let side = |opacity: f32| {
+        let material = Material { opacity, alpha: Alpha::Mask { cutoff: 0.5 }, ..Material::lambertian(Vec3::ONE) };
+        let mut scene =
+            room(1, 0.5).object(material, &leaves(100, 0.01, Vec3::splat(0.4), Vec3::splat(0.5), 3)).build();
+        scene.mesh.objects[6].kind = PartKind::Filtered;
+        let s = run(&Arc::new(scene), &params(0.3, 2e-4));
+        assert_eq!(s.clusters.len(), 1);
+        s.clusters[0].clone()
+    };
+    let (solid, gone) = (side(1.0), side(0.0));
+    assert!(solid.residual.hit_share > 0.01 && gone.residual.hit_share == 0.0);
+    let shape = &gone.equivalent_box;
+    assert!(shape.half.is_finite() && shape.half.min_element() > 0.0 && shape.centre.is_finite());
+    assert!(shape.half.max_element() < 0.01 * solid.equivalent_box.half.max_element());
+    assert!(shape.reflectance.iter().flatten().all(|r| r.is_finite()));
 }
 
 /// Mean projected area of the cluster over that of the fitted box, minus 1, and three standard errors, on lines that the fit

@@ -205,8 +205,9 @@ fn projected_areas(size: Vec3, tally: &LineTally) -> DVec3 {
     let p = tally.hit_share();
     let sum = p * half;
     let sum_variance = half * half * p * (1.0 - p) / lines;
-    // Flat boxes have faces without area; a trace of the whole surface keeps proportions finite.
-    let floor = 1e-6 * sum;
+    // Flat boxes have faces without area, and a cluster that no line hit has none at all; a trace of the bounding box
+    // keeps proportions finite.
+    let floor = 1e-6 * sum + 1e-9 * half;
     DVec3::from_array(std::array::from_fn(|axis| {
         let share = f64::from(tally.hits[axis]) / lines;
         let measured = (measure * share - across * sum) / (along - across);
