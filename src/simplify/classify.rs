@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::{SimplifyParams, Surface};
 use crate::backend::PartKind;
 use crate::error::{Error, Result};
-use crate::scene::{Material, Scene};
+use crate::scene::{Aabb, Material, Scene};
 
 /// Perceptual roughness under which a metal counts as a mirror. A mirror shows its surroundings, which no diffuse box does.
 const MIRROR_ROUGHNESS: f32 = 0.25;
@@ -82,19 +82,42 @@ pub fn find_small(scene: &Scene, surfaces: &[Surface], a_thresh: f64, limit: f32
     }
     // Anything that touches another surface may be part of an enclosure (GSII-025: the walls of a room whose area is below
     // A_thresh), and without it light would leak.
-    let mut by_area: Vec<u32> = (0..surfaces.len() as u32).collect();
-    by_area.sort_by(|&a, &b| surfaces[b as usize].area.total_cmp(&surfaces[a as usize].area));
     let gap = neighbour_gap(limit);
-    small.long_isolated = long
-        .par_iter()
-        .copied()
-        .filter(|&i| {
-            let bounds = surfaces[i as usize].bounds.expanded(gap);
-            !by_area.iter().any(|&j| j != i && surfaces[j as usize].bounds.overlaps(&bounds))
-        })
-        .collect();
+    let neighbours = BoundsAlongX::new(surfaces);
+    let alone = |&i: &u32| !neighbours.any_overlap(surfaces, &surfaces[i as usize].bounds.expanded(gap), i);
+    small.long_isolated = long.par_iter().copied().filter(alone).collect();
     small.long_kept = long.len() - small.long_isolated.len();
     small
+}
+
+/// Surfaces sorted by where their bounds begin along x.
+struct BoundsAlongX {
+    order: Vec<u32>,
+    /// For each place in `order`, the farthest end of the bounds up to there.
+    reach: Vec<f32>,
+}
+
+impl BoundsAlongX {
+    fn new(surfaces: &[Surface]) -> Self {
+        let bounds = |s: u32| surfaces[s as usize].bounds;
+        let mut order: Vec<u32> = (0..surfaces.len() as u32).collect();
+        order.sort_by(|&a, &b| bounds(a).min.x.total_cmp(&bounds(b).min.x));
+        let mut farthest = f32::NEG_INFINITY;
+        let reach = order.iter().map(|&s| {
+            farthest = farthest.max(bounds(s).max.x);
+            farthest
+        });
+        BoundsAlongX { reach: reach.collect(), order }
+    }
+
+    /// Whether the bounds of any surface but `except` overlap `bounds`.
+    fn any_overlap(&self, surfaces: &[Surface], bounds: &Aabb, except: u32) -> bool {
+        let end = self.order.partition_point(|&s| surfaces[s as usize].bounds.min.x <= bounds.max.x);
+        let candidates = self.order[..end].iter().zip(&self.reach[..end]).rev();
+        candidates
+            .take_while(|&(_, &reach)| reach >= bounds.min.x)
+            .any(|(&s, _)| s != except && surfaces[s as usize].bounds.overlaps(bounds))
+    }
 }
 
 /// Small surfaces closer than this belong together.

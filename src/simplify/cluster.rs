@@ -18,9 +18,13 @@ const WINDOW: usize = 12;
 /// Morton order separates some neighbours at the planes of its grid; sorting again on a shifted grid brings them together.
 const SHIFTS: [f32; 3] = [0.0, 0.31, 0.67];
 
-/// The least share of its bounding box's surface that a cluster may fill with its own. What is sparser than that is not
-/// represented by any box, and separate boxes are better.
-const LEAST_FILL: f64 = 0.03;
+/// Rounds of merging after each sort. Each round about halves what can still merge, so this is never reached but by
+/// arrangements made for it.
+const MOST_ROUNDS: usize = 100;
+
+/// The least share of its bounding box's surface that a cluster may fill with its own. What is sparser than that a
+/// box would gather far from where most of it is.
+const LEAST_FILL: f64 = 0.01;
 
 /// A candidate cluster.
 #[derive(Clone, Debug)]
@@ -52,7 +56,11 @@ pub fn find_clusters(mesh: &Mesh, map: &SurfaceMap, small: &[u32], limit: f32) -
     let mut groups = connected(mesh, map, small, limit);
     for shift in SHIFTS {
         morton_sort(&mut groups, shift);
-        while merge_pairs(&mut groups, limit) {}
+        for _ in 0..MOST_ROUNDS {
+            if !merge_pairs(&mut groups, limit) {
+                break;
+            }
+        }
     }
     for group in &mut groups {
         group.surfaces.sort_unstable();

@@ -4,10 +4,13 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
-use super::fit::face_axes;
+use super::fit::{face_axes, face_side};
 use super::{Class, Cluster, EquivalentBox, Surface};
 use crate::backend::{HitFilter, Part, PartKind, TriangleSet};
 use crate::scene::Scene;
+
+/// Triangles of a box.
+pub const BOX_TRIANGLES: u32 = 12;
 
 /// Where a triangle of the simplified geometry comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -141,7 +144,7 @@ fn box_face(b: &EquivalentBox, face: usize) -> [Vec3; 4] {
     let (normal_axis, first, second) = face_axes(face);
     [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(s, t)| {
         let mut local = Vec3::ZERO;
-        local[normal_axis] = if face % 2 == 0 { -1.0 } else { 1.0 };
+        local[normal_axis] = face_side(face);
         local[first] = s;
         local[second] = t;
         b.centre + b.axes * (local * b.half)

@@ -6,8 +6,8 @@ pub mod dropped;
 pub mod fit;
 pub mod geometry;
 mod replace;
-pub mod surfaces;
 mod support;
+pub mod surfaces;
 #[cfg(test)]
 mod testing;
 #[cfg(test)]
@@ -19,10 +19,10 @@ use glam::{Mat3, Vec3};
 
 pub use geometry::{SimplifiedGeometry, TriangleSource};
 
-use crate::backend::{HitFilter, RayBackend};
+use crate::backend::{HitFilter, PartKind, RayBackend};
 use crate::error::Result;
 use crate::progress::Progress;
-use crate::scene::{Aabb, Scene};
+use crate::scene::{Aabb, AlphaFilter, Scene};
 
 /// How a cluster's box is fitted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, serde::Serialize, clap::ValueEnum)]
@@ -71,7 +71,7 @@ pub struct Surface {
 /// What becomes of a surface in the simplified scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Class {
-    /// Large enough (or a light source, mirror or glass): in both scenes.
+    /// Large enough (or a light source, mirror or glass, or too few triangles for a box to be simpler): in both scenes.
     Normal,
     /// Small: only in the detailed scene, replaced by the box of this cluster, or by nothing when isolated.
     Complex {
@@ -137,7 +137,7 @@ pub struct FitResidual {
     pub hit_share: f32,
     /// Intercepted flux of the box over that of the cluster, minus 1.
     pub intercepted: f32,
-    /// Standard error of `intercepted`.
+    /// Standard error of `intercepted`; infinite when no line hit the cluster, so that nothing is known.
     pub intercepted_error: f32,
     /// Mean reflected colour of the box minus that of the cluster.
     pub reflected: Vec3,
@@ -170,7 +170,7 @@ pub struct Simplified {
 /// [`Error::Usage`](crate::error::Error::Usage) for parameters that make no sense;
 /// [`Error::Backend`](crate::error::Error::Backend) when the backend fails.
 pub fn simplify(
-    scene: &Scene,
+    scene: &Arc<Scene>,
     backend: &dyn RayBackend,
     params: &SimplifyParams,
     progress: &Progress,
@@ -191,6 +191,7 @@ pub fn simplify(
                 "{kept_long} surfaces have less area than A_thresh = {a_thresh:.3e} but are longer than {limit:.3e} and stay normal"
             ));
         }
+        groups.retain(|g| worth_a_box(g, &surfaces));
         for (cluster, group) in (0u32..).zip(&groups) {
             for &s in &group.surfaces {
                 surfaces[s as usize].class = Class::Complex { cluster: Some(cluster) };
@@ -220,6 +221,11 @@ fn is_used(scene: &Scene, r_thresh: f32) -> bool {
     r_thresh > 0.0 && r_thresh <= 2.0 * scene.mesh.bounds.diagonal()
 }
 
+/// Whether a box is simpler than what it replaces. A few quads are not worth one: they stay as they are, which is exact.
+fn worth_a_box(group: &cluster::Group, surfaces: &[Surface]) -> bool {
+    group.surfaces.iter().map(|&s| surfaces[s as usize].triangles).sum::<u32>() > geometry::BOX_TRIANGLES
+}
+
 /// Takes the groups that are dropped out of `groups` and marks their surfaces. Returns how many surfaces had to stay normal
 /// because they are too long for a cluster.
 fn drop_isolated(
@@ -234,8 +240,7 @@ fn drop_isolated(
         let surface: &Surface = &surfaces[s as usize];
         dropped::Candidate { centre: surface.bounds.centre(), area: surface.area }
     };
-    let candidates: Vec<_> =
-        groups.iter().map(of_group).chain(small.long_isolated.iter().map(of_surface)).collect();
+    let candidates: Vec<_> = groups.iter().map(of_group).chain(small.long_isolated.iter().map(of_surface)).collect();
     let is_dropped = dropped::choose_dropped(&candidates, a_thresh, r_thresh);
     let (of_groups, of_long) = is_dropped.split_at(groups.len());
     let gone = Class::Complex { cluster: None };
@@ -259,7 +264,7 @@ fn drop_isolated(
 }
 
 /// The scene's filter for alpha-tested triangles, where it has any.
-pub(crate) fn scene_filter(scene: &Scene) -> Option<Arc<dyn HitFilter>> {
-    let _ = scene;
-    None
+fn scene_filter(scene: &Arc<Scene>) -> Option<Arc<dyn HitFilter>> {
+    let any = scene.mesh.objects.iter().any(|o| o.kind == PartKind::Filtered);
+    any.then(|| Arc::new(AlphaFilter::new(scene.clone())) as Arc<dyn HitFilter>)
 }

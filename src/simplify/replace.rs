@@ -1,5 +1,7 @@
 //! Clusters become boxes.
 
+use std::sync::Arc;
+
 use glam::Mat3;
 use rayon::prelude::*;
 
@@ -18,8 +20,8 @@ use crate::scene::Scene;
 
 /// Lines for all fits together, for each triangle of the scene and at least: what keeps simplification under two seconds per
 /// million triangles.
-const LINES_PER_TRIANGLE: usize = 2;
-const LEAST_BUDGET: usize = 1 << 20;
+const LINES_PER_TRIANGLE: usize = 1;
+const LEAST_BUDGET: usize = 1 << 19;
 
 /// Most lines for one fit; `sampling::sobol` has as many points in a stream.
 const MOST_LINES: u32 = 1 << 15;
@@ -43,7 +45,7 @@ struct Fitted {
 
 /// Fits a box to each group. `normal` is what may carry them.
 pub(super) fn replace(
-    scene: &Scene,
+    scene: &Arc<Scene>,
     backend: &dyn RayBackend,
     params: &SimplifyParams,
     groups: &[Group],

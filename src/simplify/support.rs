@@ -4,7 +4,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::fit::{Frame, face_axes};
+use super::fit::{Frame, face_axes, face_side};
 use crate::backend::{Coherence, Hit, Ray, RayScene, Visible};
 
 /// Probes along each edge of a face.
@@ -40,7 +40,7 @@ pub(crate) fn contacts(normal: &dyn RayScene, frames: &[Frame]) -> Vec<[bool; 6]
 fn probes(frame: &Frame, face: usize) -> impl Iterator<Item = Ray> {
     let frame = *frame;
     let (normal_axis, first, second) = face_axes(face);
-    let outward = if face % 2 == 0 { -1.0 } else { 1.0 };
+    let outward = face_side(face);
     let reach = REACH * 2.0 * frame.half.max_element();
     (0..PROBES * PROBES).map(move |i| {
         let spot = |k: usize| (2 * k + 1) as f32 / PROBES as f32 - 1.0;

@@ -210,3 +210,71 @@ impl DisjointSets {
         numbers
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+    use crate::simplify::testing::*;
+
+    const CREASE: f32 = 0.5;
+
+    fn count(triangles: &[[Vec3; 3]]) -> usize {
+        find_surfaces(&SceneBuilder::default().grey(0.5, triangles).build().mesh, CREASE).surfaces.len()
+    }
+
+    #[test]
+    fn a_box_has_six_sides_and_a_sphere_one() {
+        assert_eq!(count(&solid([0.0; 3], [1.0; 3])), 6);
+        assert_eq!(count(&sphere(Vec3::ZERO, 1.0, 16)), 1);
+    }
+
+    #[test]
+    fn mixed_winding_does_not_tear_a_sheet() {
+        let mut sheet = diced_quad(Vec3::ZERO, Vec3::X, Vec3::Y, 10);
+        sheet.iter_mut().step_by(3).for_each(|t| t.swap(1, 2));
+        assert_eq!(count(&sheet), 1);
+    }
+
+    #[test]
+    fn coincident_sides_stay_apart_and_whole() {
+        let mut sheet = diced_quad(Vec3::ZERO, Vec3::X, Vec3::Y, 10);
+        let back: Vec<_> = sheet.iter().map(|&[a, b, c]| [a, c, b]).collect();
+        sheet.extend(back);
+        assert_eq!(count(&sheet), 2);
+    }
+
+    #[test]
+    fn a_wall_on_a_floor_does_not_cut_it() {
+        let mut floor = diced_quad(Vec3::ZERO, Vec3::X, Vec3::Z, 2);
+        floor.extend(quad(Vec3::new(0.5, 0.0, 0.0), Vec3::Z * 0.5, Vec3::Y));
+        assert_eq!(count(&floor), 2);
+    }
+
+    #[test]
+    fn objects_do_not_share_surfaces() {
+        let (left, right) = (quad(Vec3::ZERO, Vec3::X, Vec3::Y), quad(Vec3::X, Vec3::X, Vec3::Y));
+        let scene = SceneBuilder::default().grey(0.5, &left).grey(0.5, &right).build();
+        let map = find_surfaces(&scene.mesh, CREASE);
+        assert_eq!(map.of_triangle, [0, 0, 1, 1]);
+        assert_eq!(map.surfaces[1].object, 1);
+        assert!((map.surfaces[1].area - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn negative_zero_is_zero() {
+        let flipped = [[Vec3::ZERO, Vec3::X, Vec3::Y], [Vec3::new(-0.0, 0.0, -0.0), Vec3::Y, Vec3::NEG_X]];
+        assert_eq!(count(&flipped), 1);
+    }
+
+    #[test]
+    fn crease_angle_decides() {
+        let bent = |angle: f32| {
+            let mut sheet = quad(Vec3::ZERO, Vec3::Z, Vec3::X);
+            sheet.extend(quad(Vec3::ZERO, Vec3::new(-angle.cos(), angle.sin(), 0.0), Vec3::Z));
+            count(&sheet)
+        };
+        assert_eq!((bent(CREASE - 0.01), bent(CREASE + 0.01)), (1, 2));
+    }
+}

@@ -5,9 +5,7 @@ use std::f32::consts::{PI, TAU};
 use glam::{DVec3, Mat3, Vec3};
 
 use super::SimplifyParams;
-use crate::backend::{
-    Coherence, Hit, HitFilter, Part, PartKind, Ray, RayBackend, RayScene, TriangleSet, Visible,
-};
+use crate::backend::{Coherence, Hit, HitFilter, Part, PartKind, Ray, RayBackend, RayScene, TriangleSet, Visible};
 use crate::error::Result;
 use crate::scene::{Aabb, Material, Mesh, Object, Scene};
 

@@ -8,6 +8,7 @@
 //! (p-theory of plant canopies).
 
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 use glam::{DVec3, Mat3, Vec3};
 
@@ -108,9 +109,10 @@ impl FluxFit {
     /// The box for a cluster with bounding-box edges `size`, of which `tally` was measured.
     pub(crate) fn new(size: Vec3, tally: &LineTally) -> Self {
         let edges = box_edges(size, tally);
-        let measured = tally.patches.each_ref().map(|face| {
-            face.iter().map(|&(hits, sum)| (hits > 0).then(|| sum / hits as f32)).collect::<Vec<_>>()
-        });
+        let measured = tally
+            .patches
+            .each_ref()
+            .map(|face| face.iter().map(|&(hits, sum)| (hits > 0).then(|| sum / hits as f32)).collect::<Vec<_>>());
         let albedo = tally.albedo();
         let mut reflectance = fill_patches(&measured, albedo);
         match_mean(&mut reflectance, edges, albedo);
@@ -123,7 +125,7 @@ impl FluxFit {
 /// # Errors
 /// When the backend fails.
 pub fn fit_flux(
-    scene: &Scene,
+    scene: &Arc<Scene>,
     backend: &dyn RayBackend,
     triangles: &[u32],
     axes: Mat3,
@@ -203,8 +205,9 @@ fn projected_areas(size: Vec3, tally: &LineTally) -> DVec3 {
     let p = tally.hit_share();
     let sum = p * half;
     let sum_variance = half * half * p * (1.0 - p) / lines;
-    // Flat boxes have faces without area; a trace of the whole surface keeps proportions finite.
-    let floor = 1e-6 * sum;
+    // Flat boxes have faces without area, and a cluster that no line hit has none at all; a trace of the bounding box
+    // keeps proportions finite.
+    let floor = 1e-6 * sum + 1e-9 * half;
     DVec3::from_array(std::array::from_fn(|axis| {
         let share = f64::from(tally.hits[axis]) / lines;
         let measured = (measure * share - across * sum) / (along - across);

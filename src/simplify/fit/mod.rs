@@ -5,10 +5,12 @@
 //! each is moved to a cell of its own, turned into its box's axes and scaled to unit size ([`Stage`]). Rays end before they
 //! leave the cell. Unit size also makes error bounds the same for a thumbtack and a tree.
 
-pub mod frame;
 pub mod flux;
+pub mod frame;
 pub mod lines;
 pub mod paper1993;
+#[cfg(test)]
+mod paper_tests;
 pub mod residual;
 
 use std::sync::Arc;
@@ -90,7 +92,7 @@ impl Stage {
     }
 
     /// Builds the acceleration structure.
-    pub(crate) fn build(&self, scene: &Scene, backend: &dyn RayBackend) -> Result<Box<dyn RayScene>> {
+    pub(crate) fn build(&self, scene: &Arc<Scene>, backend: &dyn RayBackend) -> Result<Box<dyn RayScene>> {
         let filtered = self.parts.iter().any(|p| p.kind == PartKind::Filtered);
         let filter = if filtered { super::scene_filter(scene) } else { None };
         backend.build(&TriangleSet {
@@ -142,6 +144,11 @@ pub(crate) fn face_axes(face: usize) -> (usize, usize, usize) {
         1 => (1, 0, 2),
         _ => (2, 0, 1),
     }
+}
+
+/// -1 for the three faces at the lower end of their axes, 1 for the others.
+pub(crate) fn face_side(face: usize) -> f32 {
+    if face & 1 == 0 { -1.0 } else { 1.0 }
 }
 
 /// Index of the patch at `s`, `t` (0..=1) of a face with `resolution^2` patches.

@@ -5,9 +5,11 @@
 //! see the same silhouette, so their fractions are averaged. A length can come out as zero (plates without thickness, GSII-007;
 //! a diagonal sheet, GSII-008); [`PaperFit::lengths`] says so, the box itself gets a least thickness.
 
+use std::sync::Arc;
+
 use glam::{DVec3, Mat3, Vec2, Vec3};
 
-use super::{LEAST_THICKNESS, MARGIN, Probe, Stage, face_axes, frame_along, patch_index};
+use super::{LEAST_THICKNESS, MARGIN, Probe, Stage, face_axes, face_side, frame_along, patch_index};
 use crate::backend::{Coherence, Hit, Ray, RayBackend, Visible};
 use crate::error::Result;
 use crate::sampling;
@@ -93,7 +95,7 @@ impl PaperFit {
 /// # Errors
 /// When the backend fails.
 pub fn fit_paper1993(
-    scene: &Scene,
+    scene: &Arc<Scene>,
     backend: &dyn RayBackend,
     triangles: &[u32],
     axes: Mat3,
@@ -113,11 +115,12 @@ pub fn fit_paper1993(
 fn perpendicular(probe: &Probe<'_>, face: usize, spot: Vec2) -> Ray {
     let (normal_axis, first, second) = face_axes(face);
     let bounds = probe.bounds;
-    let (mut origin, inward) = if face % 2 == 0 { (bounds.min, 1.0) } else { (bounds.max, -1.0) };
+    let outward = face_side(face);
+    let mut origin = if outward < 0.0 { bounds.min } else { bounds.max };
     origin[first] = (bounds.min[first] + spot.x * bounds.size()[first]).min(bounds.max[first]);
     origin[second] = (bounds.min[second] + spot.y * bounds.size()[second]).min(bounds.max[second]);
-    origin[normal_axis] -= inward * MARGIN;
+    origin[normal_axis] += outward * MARGIN;
     let mut direction = Vec3::ZERO;
-    direction[normal_axis] = inward;
+    direction[normal_axis] = -outward;
     probe.ray(origin, direction)
 }

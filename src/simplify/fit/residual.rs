@@ -14,6 +14,9 @@ impl FitResidual {
     pub(crate) fn new(size: Vec3, edges: Vec3, reflectance: &[Vec<Vec3>; 6], fresh: &LineTally) -> Self {
         let of_box = half_surface(edges) / half_surface(size);
         let of_cluster = fresh.hit_share();
+        if of_cluster == 0.0 {
+            return FitResidual { intercepted_error: f32::INFINITY, ..FitResidual::default() };
+        }
         let ratio = of_box / of_cluster;
         FitResidual {
             hit_share: of_cluster as f32,
