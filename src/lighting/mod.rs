@@ -14,7 +14,6 @@ mod tree;
 #[cfg(test)]
 mod tests;
 
-pub mod shadow;
 
 use glam::Vec3;
 

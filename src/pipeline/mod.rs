@@ -218,6 +218,8 @@ impl Settings {
             direct: self.direct,
             error: self.radiosity_error,
             seed: self.seed,
+            ambient: true,
+            max_patches: 400_000,
         }
     }
 }

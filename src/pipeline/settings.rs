@@ -96,7 +96,7 @@ impl Default for Settings {
             patch_size: None,
             unshot: 0.01,
             direct: DirectLight::Gather,
-            radiosity_error: 0.02,
+            radiosity_error: 0.05,
             glossy_threshold: 0.3,
             max_depth: u32::MAX,
             backend: BackendKind::Embree,

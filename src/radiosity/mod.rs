@@ -114,7 +114,7 @@ pub struct RadiosityScene<'a> {
 /// Rays of the first solution for each lit side: enough to estimate the error.
 const FIRST_RAYS: u64 = 64;
 /// Fewest and most rays that the light of the first bounce is shot with.
-const RAYS: (u64, u64) = (1 << 15, 1 << 36);
+const RAYS: (u64, u64) = (1 << 15, 1 << 24);
 /// Solutions that may be averaged to reach the error.
 const MAX_ROUNDS: u32 = 4;
 
