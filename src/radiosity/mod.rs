@@ -185,7 +185,8 @@ impl Average {
         for round in 0..MAX_ROUNDS {
             self.add_pair(tracer, params, direct.as_ref(), rays, round, progress)?;
             total += rays;
-            let error = self.error(tracer.optics);
+            // Few patches make the estimate itself uncertain, and stopping when it happens to be low would favour that.
+            let error = self.error(tracer.optics) * (1.0 + 1.5 / (lit.max(1) as f64).sqrt());
             if error <= target || progress.stopped() {
                 return Ok(());
             }

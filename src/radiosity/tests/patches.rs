@@ -30,10 +30,12 @@ fn hard_012_diced_cube_has_the_same_radiosity() {
         Room::new(faces.map(|(face, e)| (diced(face, n), material(0.5, e))).collect(), Vec::new())
     };
     for room in [cube(1), cube(100)] {
-        let params = RadiosityParams { patch_size: 1.0 / 15.0, error: 0.01, unshot: 1e-3, ..RadiosityParams::new(1.0) };
+        let params =
+            RadiosityParams { patch_size: 1.0 / 9.0, error: 2.5e-3, unshot: 1e-3, ..RadiosityParams::new(1.0) };
         let solution = room.solve(&params).unwrap();
-        assert_eq!(solution.patches, 6 * 225);
-        // Irradiance at the floor centre (RAD-016); H = B / rho. A patch of 1/15 averages over a flat maximum.
+        assert_eq!(solution.patches, 6 * 81);
+        // Irradiance at the floor centre (RAD-016); H = B / rho. A patch of 1/9 averages over a flat
+        // maximum (0.2 % less); the tolerance leaves three standard errors beyond that.
         let floor = &room.scene.mesh.objects[4].triangles;
         let middle = floor.clone().find(|&t| {
             let [a, b, c] = room.scene.mesh.corners(t);
