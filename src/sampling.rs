@@ -6,10 +6,14 @@ use glam::{Vec2, Vec3};
 
 /// Owen-scrambled Sobol points, four dimensions at a time, with values in 0..1.
 ///
-/// `stream` keeps unrelated uses (pixels, patches, clusters) apart; `index` is the sample's number, less than 65536, and
-/// every prefix of a power of two is well distributed; `dimension` numbers blocks of four, 0..64.
+/// `stream` keeps unrelated uses (pixels, patches, clusters) apart; `index` is the sample's number: among the first 65536
+/// every prefix of a power of two is well distributed; later points belong to further scramblings. `dimension` numbers blocks
+/// of four; beyond 64 of them (long paths) blocks repeat under another scrambling.
 pub fn sobol(index: u32, dimension: u32, stream: u32) -> [f32; 4] {
-    sobol_burley::sample_4d(index & 0xffff, dimension, hash(stream ^ (index >> 16).wrapping_mul(0x9e37_79b9)))
+    const BLOCKS: u32 = sobol_burley::NUM_DIMENSION_SETS_4D;
+    const INDICES: u32 = 1 << 16;
+    let wrapped = (index / INDICES).wrapping_mul(0x9e37_79b9) ^ (dimension / BLOCKS).wrapping_mul(0x85eb_ca6b);
+    sobol_burley::sample_4d(index % INDICES, dimension % BLOCKS, hash(stream ^ wrapped))
 }
 
 /// A good 32-bit hash (Ettinger's two-round mixer).

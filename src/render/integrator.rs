@@ -37,8 +37,11 @@ const SHADOW_MARGIN: f32 = 1.0 / 8192.0;
 /// A far ray starts this much (relative) before the near one ended, so that nothing falls between the two.
 const SEAM: f32 = 4.0 * f32::EPSILON;
 
-/// Weakly directional bounces after which paths play Russian roulette.
+/// Scattering events after which paths play Russian roulette ...
 const ROULETTE_DEPTH: u32 = 3;
+
+/// ... and after which even one that lost nothing may end: light can be trapped in glass for ever.
+const CERTAIN_DEPTH: u32 = 32;
 
 /// Random numbers of one path: one block of four for the camera, then two for each scattering event.
 const BLOCKS_PER_EVENT: u32 = 2;
@@ -414,14 +417,15 @@ impl<'a> World<'a> {
                 (false, None) => Arrival::Sharp,
                 (false, Some(pdf)) => Arrival::Glossy { pdf, position: point.position, normal: facing },
             };
-            ws.next.push(Path {
+            let next = Path {
                 ray: Ray::new(point.ray_origin(sample.direction), sample.direction),
                 throughput: path.throughput * sample.weight / choose_high,
                 near: if path.near.is_finite() { (path.near - hit.t).max(0.0) } else { path.near },
                 arrival,
                 depth: path.depth + 1,
                 ..path
-            });
+            };
+            ws.next.extend(roulette(next, u[3] / choose_high));
             return;
         }
         let throughput = path.throughput / (1.0 - choose_high);
@@ -434,7 +438,7 @@ impl<'a> World<'a> {
             return;
         }
         let Some(sample) = bsdf.sample_low([u[0], u[1], u[2]]) else { return };
-        let mut next = Path {
+        let next = Path {
             ray: Ray::new(point.ray_origin(sample.direction), sample.direction),
             throughput: throughput * sample.weight,
             near: self.far.map_or(f32::INFINITY, |far| far.r_thresh * (0.5 + lights[3])),
@@ -443,14 +447,7 @@ impl<'a> World<'a> {
             depth: path.depth + 1,
             ..path
         };
-        if next.depth >= ROULETTE_DEPTH {
-            let survival = next.throughput.max_element().min(1.0);
-            let rescaled = (u[3] - choose_high) / (1.0 - choose_high);
-            if rescaled >= survival {
-                return;
-            }
-            next.throughput /= survival;
-        }
+        let Some(next) = roulette(next, (u[3] - choose_high) / (1.0 - choose_high)) else { return };
         match (path.gathers, capture) {
             (false, Some(captured)) => captured.push(next),
             _ => ws.next.push(next),
@@ -532,6 +529,13 @@ impl Workspace {
             sums.resize(trials, Vec3::ZERO);
         }
     }
+}
+
+/// Ends a path that brings little, or strengthens it by as much as others end; `u` in 0..1. Nothing is lost on average.
+fn roulette(path: Path, u: f32) -> Option<Path> {
+    let most = if path.depth < CERTAIN_DEPTH { 1.0 } else { 0.95 };
+    let survival = if path.depth < ROULETTE_DEPTH { 1.0 } else { path.throughput.max_element().min(most) };
+    (u < survival).then_some(Path { throughput: path.throughput / survival, ..path })
 }
 
 /// Probability of going on along the highly directional part. Square roots keep weak but sharp reflections of light sources
