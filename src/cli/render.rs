@@ -53,7 +53,7 @@ pub struct Options {
     #[arg(long, value_name = "N", default_value_t = 16, help_heading = "Quality")]
     min_trials: u32,
     /// Most trials of a pixel in each pass
-    #[arg(long, value_name = "N", default_value_t = 1024, help_heading = "Quality")]
+    #[arg(long, value_name = "N", default_value_t = 512, help_heading = "Quality")]
     max_trials: u32,
     /// Fixed sampling: short for --min-trials N --max-trials N
     #[arg(long, value_name = "N", help_heading = "Quality", conflicts_with_all = ["min_trials", "max_trials", "error", "hires_error", "lores_error"])]

@@ -4,6 +4,7 @@ use glam::{Vec2, Vec3};
 
 use super::{Method, Settings};
 use crate::backend::{Coherence, Hit, Ray, RayScene, Visible};
+use crate::radiosity::Focus;
 use crate::sampling::{basis, cosine_hemisphere, sobol};
 use crate::scene::{Camera, Scene};
 use crate::shading::SurfacePoint;
@@ -21,18 +22,23 @@ const PATCH_SHARE: f32 = 0.75;
 /// Patch size over the median gather ray where nothing is simplified.
 const COMPLETE_PATCH_SHARE: f32 = 0.08;
 
+/// What a camera's first gather rays tell about the room.
+struct Surroundings {
+    /// Median length of a gather ray.
+    median: f32,
+    /// Where they end.
+    focus: Focus,
+}
+
 /// Fills in what is `None`.
 pub fn fill_in(settings: &mut Settings, scene: &Scene, detailed: &dyn RayScene, camera: &Camera) {
     if settings.method == Method::Mcpt {
         settings.r_thresh = Some(f32::INFINITY);
         return;
     }
-    if settings.r_thresh.is_some() && settings.patch_size.is_some() {
-        return;
-    }
-    let median = median_gather_distance(scene, detailed, camera)
-        .unwrap_or_else(|| 0.5 * scene.mesh.bounds.diagonal())
-        .max(f32::MIN_POSITIVE);
+    let surroundings = look_around(scene, detailed, camera);
+    settings.focus = settings.focus.or(surroundings.as_ref().map(|s| s.focus));
+    let median = surroundings.map_or(0.5 * scene.mesh.bounds.diagonal(), |s| s.median).max(f32::MIN_POSITIVE);
     if settings.method == Method::Pmm {
         settings.r_thresh = Some(0.0);
     }
@@ -45,8 +51,8 @@ pub fn fill_in(settings: &mut Settings, scene: &Scene, detailed: &dyn RayScene, 
     });
 }
 
-/// Median length of cosine-distributed rays from what the camera sees; `None` when it sees nothing.
-pub fn median_gather_distance(scene: &Scene, detailed: &dyn RayScene, camera: &Camera) -> Option<f32> {
+/// Follows cosine-distributed rays from what the camera sees; `None` when they meet nothing.
+fn look_around(scene: &Scene, detailed: &dyn RayScene, camera: &Camera) -> Option<Surroundings> {
     const STREAM: u32 = 0x6175_746f;
     let views: Vec<Ray> = (0..PROBES)
         .map(|i| {
@@ -75,7 +81,19 @@ pub fn median_gather_distance(scene: &Scene, detailed: &dyn RayScene, camera: &C
         .collect();
     let mut hits = vec![Hit::MISS; gathers.len()];
     detailed.closest(&gathers, Visible::All, Coherence::Incoherent, &mut hits);
-    let mut lengths: Vec<f32> = hits.iter().filter(|h| h.is_hit()).map(|h| h.t).collect();
-    lengths.sort_by(f32::total_cmp);
-    lengths.get(lengths.len() / 2).copied()
+    let ends: Vec<(f32, Vec3)> =
+        gathers.iter().zip(&hits).filter(|(_, h)| h.is_hit()).map(|(ray, h)| (h.t, ray.at(h.t))).collect();
+    let median = quantile(ends.iter().map(|e| e.0), 0.5)?;
+    let axis = |k: usize| quantile(ends.iter().map(|e| e.1[k]), 0.5);
+    let centre = Vec3::new(axis(0)?, axis(1)?, axis(2)?);
+    // Nine tenths of where gather rays end: far things seen through a window do not count.
+    let radius = quantile(ends.iter().map(|e| e.1.distance(centre)), 0.9)?.max(median);
+    Some(Surroundings { median, focus: Focus { centre, radius } })
+}
+
+/// The value below which the share `q` of all values lies; `None` for no values.
+fn quantile(values: impl Iterator<Item = f32>, q: f32) -> Option<f32> {
+    let mut values: Vec<f32> = values.collect();
+    values.sort_by(f32::total_cmp);
+    values.get((q * values.len() as f32) as usize).copied()
 }

@@ -235,6 +235,7 @@ impl Settings {
         RadiosityParams {
             patch_size: self.patch_size.unwrap_or(f32::MAX),
             max_rays: self.radiosity_rays,
+            focus: self.focus,
             unshot: self.unshot,
             direct: self.direct,
             error: self.radiosity_error,

@@ -6,7 +6,7 @@ use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 use crate::error::{Error, Result};
-use crate::radiosity::DirectLight;
+use crate::radiosity::{DirectLight, Focus};
 use crate::simplify::BoxFit;
 
 /// The paper's methods.
@@ -71,6 +71,8 @@ pub struct Settings {
     pub direct: DirectLight,
     /// Relative statistical error of the radiosity solution.
     pub radiosity_error: f32,
+    /// Where the radiosity solution must be good; filled in from what the camera sees.
+    pub focus: Option<Focus>,
     /// Most rays that first bounces of the radiosity solution are shot with, whatever its error then is.
     pub radiosity_rays: u64,
     /// Roughness under which a specular lobe counts as highly directional.
@@ -102,6 +104,7 @@ impl Default for Settings {
             unshot: 0.01,
             direct: DirectLight::Gather,
             radiosity_error: 0.15,
+            focus: None,
             radiosity_rays: 1 << 22,
             glossy_threshold: 0.3,
             filter_glossy: 0.3,

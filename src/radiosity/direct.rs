@@ -10,10 +10,16 @@ use crate::backend::Ray;
 use crate::lighting::shadow::{ShadowRay, light_visibility};
 use crate::sampling;
 
-/// Samples a side gets before it is known how much it varies.
+/// Samples a side gets before it is known how much it varies ...
 const PILOT: u32 = 8;
-/// Fewest and most samples a side.
-const SAMPLES: (u32, u32) = (4, 1024);
+/// ... and where it hardly matters.
+const PILOT_FAR: u32 = 2;
+/// Fewest samples of a side, and where it hardly matters.
+const LEAST: [u32; 2] = [4, 1];
+/// Most samples of a side.
+const MOST: u32 = 1024;
+/// Relevance below which a side hardly matters.
+const FAR: f64 = 0.05;
 /// Sides looked at by one job.
 const JOB: usize = 64;
 
@@ -31,6 +37,7 @@ pub(super) struct Direct {
 #[derive(Clone, Copy, Default)]
 struct Estimate {
     mean: DVec3,
+    /// Zero when there was only one sample.
     variance: f64,
     rays: u64,
 }
@@ -43,15 +50,22 @@ pub(super) fn gather(input: &RadiosityScene<'_>, patches: &Patches, seed: u32, t
     let sides = 2 * patches.len();
     let area = |side: usize| patches.open_area(side as u32);
     let stream = |what: u32| sampling::hash_all(&[seed, 0x00d1_9ec7, what]);
-    let pilot = estimate(input, patches, &vec![PILOT; sides], stream(2));
+    let far = |side: usize| patches.relevance[side / 2] < FAR;
+    let pilot_counts: Vec<u32> = (0..sides).map(|s| if far(s) { PILOT_FAR } else { PILOT }).collect();
+    let pilot = estimate(input, patches, &pilot_counts, stream(2));
     // Sum of standard errors is least for samples in proportion to (A sigma)^(2/3).
-    let spread: Vec<f64> = pilot.iter().enumerate().map(|(s, e)| area(s) * e.variance.sqrt()).collect();
-    let flux: f64 = pilot.iter().enumerate().map(|(s, e)| area(s) * e.mean.element_sum()).sum();
+    let weighted = |side: usize| area(side) * patches.relevance[side / 2];
+    let spread: Vec<f64> = pilot.iter().enumerate().map(|(s, e)| weighted(s) * e.variance.sqrt()).collect();
+    let flux: f64 = pilot.iter().enumerate().map(|(s, e)| weighted(s) * e.mean.element_sum()).sum();
     let weight: f64 = spread.iter().map(|x| x.cbrt().powi(2)).sum();
     let per_weight = if flux > 0.0 { (weight / (target * flux)).powi(2) / 2.0 } else { 0.0 };
     let counts: Vec<u32> = spread
         .iter()
-        .map(|x| (per_weight * x.cbrt().powi(2)).ceil().clamp(SAMPLES.0.into(), SAMPLES.1.into()) as u32)
+        .enumerate()
+        .map(|(side, x)| {
+            let least = LEAST[usize::from(far(side))];
+            (per_weight * x.cbrt().powi(2)).ceil().clamp(least.into(), MOST.into()) as u32
+        })
         .map(u32::next_power_of_two)
         .collect();
     let expected: f64 = spread.iter().zip(&counts).map(|(x, &n)| x / f64::from(2 * n).sqrt()).sum();
@@ -98,7 +112,9 @@ fn estimate(input: &RadiosityScene<'_>, patches: &Patches, counts: &[u32], strea
             for ((estimate, square), &count) in estimates.iter_mut().zip(squares).zip(counts) {
                 let n = f64::from(count);
                 estimate.mean /= n;
-                estimate.variance = (square / n - estimate.mean.element_sum().powi(2)).max(0.0) * n / (n - 1.0);
+                if count > 1 {
+                    estimate.variance = (square / n - estimate.mean.element_sum().powi(2)).max(0.0) * n / (n - 1.0);
+                }
             }
             estimates
         })

@@ -17,7 +17,7 @@ mod tests;
 
 use std::f64::consts::FRAC_PI_2;
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 use crate::backend::RayScene;
 use crate::error::{Error, Result};
@@ -52,6 +52,9 @@ pub struct RadiosityParams {
     pub direct: DirectLight,
     /// Relative statistical error to aim for: decides how many rays are shot.
     pub error: f32,
+    /// Where the solution must be good. Rays, error and the stop at `unshot` are weighted by closeness to it: under a bright sky most
+    /// of the flux is outdoors, and without this a room would be left with a share of a per cent. `None`: everywhere alike.
+    pub focus: Option<Focus>,
     /// Most rays that the light of the first bounce is shot with: where the error needs more, a warning says so.
     pub max_rays: u64,
     /// Seed.
@@ -68,6 +71,7 @@ impl RadiosityParams {
             ambient: true,
             direct: DirectLight::Gather,
             error: 0.02,
+            focus: None,
             max_rays: 1 << 36,
             seed: 0,
         }
@@ -85,6 +89,24 @@ impl RadiosityParams {
             return Err(Error::Usage(format!("the radiosity error must be positive, not {}", self.error)));
         }
         Ok(())
+    }
+}
+
+/// The part of a scene that will be looked at, with what lights it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Focus {
+    /// Its middle.
+    pub centre: Vec3,
+    /// How far it reaches, scene length units, above 0.
+    pub radius: f32,
+}
+
+impl Focus {
+    /// Weight of what lies at `point`: 1 within the radius, then falling with the fourth power of distance, so that an endless plain
+    /// around a room counts about as much as the room.
+    fn weight(&self, point: Vec3) -> f64 {
+        let distance = point.distance(self.centre).max(self.radius);
+        f64::from(self.radius / distance).powi(4)
     }
 }
 
@@ -140,6 +162,9 @@ pub fn solve(input: &RadiosityScene<'_>, params: &RadiosityParams, progress: &Pr
     }
     if !input.lights.is_empty() && patches.len() > 0 {
         patches.leave_out_covered(input, params.seed);
+        if let Some(focus) = &params.focus {
+            patches.weigh(input.geometry, focus);
+        }
         let tracer = Tracer { input, patches: &patches, optics: &optics };
         average.solve(&tracer, params, progress)?;
     }
@@ -190,7 +215,7 @@ impl Average {
             self.add_pair(tracer, params, direct.as_ref(), rays, round, progress)?;
             total += rays;
             // Few patches make the estimate itself uncertain, and stopping when it happens to be low would favour that.
-            let error = self.error(tracer.optics) * (1.0 + 1.5 / (lit.max(1) as f64).sqrt());
+            let error = self.error(tracer.patches, tracer.optics) * (1.0 + 1.5 / (lit.max(1) as f64).sqrt());
             if error <= target || progress.stopped() {
                 return Ok(());
             }
@@ -203,7 +228,7 @@ impl Average {
                 break;
             }
         }
-        let error = self.error(tracer.optics);
+        let error = self.error(tracer.patches, tracer.optics);
         if error > 1.25 * target {
             self.warnings.push(format!("the radiosity solution's error is {error:.4}, not the {target} asked for"));
         }
@@ -255,10 +280,10 @@ impl Average {
 
     /// Flux-weighted relative standard error of the mean: for a normal distribution the mean magnitude of half the difference of
     /// two halves is sqrt(2 / pi) standard errors of their mean.
-    fn error(&self, optics: &Optics) -> f64 {
+    fn error(&self, patches: &Patches, optics: &Optics) -> f64 {
         let (mut difference, mut sum) = (0.0, 0.0);
         for (side, (a, b)) in self.sums[0].iter().zip(&self.sums[1]).enumerate() {
-            let reflectance = optics.reflectance[side / 2].as_dvec3();
+            let reflectance = optics.reflectance[side / 2].as_dvec3() * patches.relevance[side / 2];
             difference += (reflectance * (a - b)).element_sum().abs();
             sum += (reflectance * (a + b)).element_sum();
         }
@@ -266,7 +291,7 @@ impl Average {
     }
 
     fn into_solution(self, patches: Patches, optics: &Optics) -> Solution {
-        let error = self.error(optics) as f32;
+        let error = self.error(&patches, optics) as f32;
         let scale = if self.weight > 0.0 { 0.5 / self.weight } else { 0.0 };
         let mut ledger = Ledger::default();
         ledger.add(&self.ledger, 2.0 * scale);

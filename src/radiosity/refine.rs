@@ -72,10 +72,24 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// What a flux counts in choosing what to shoot and with how many rays: each band by its share in the emitted flux, so
-    /// that none is left behind.
-    fn importance(&self, flux: DVec3) -> f64 {
-        (0..3).filter(|&c| self.emitted[c] > 0.0).map(|c| flux[c] / self.emitted[c]).sum()
+    /// What flux of a side counts in choosing what to shoot and with how many rays: each band by its share in the emitted flux,
+    /// so that none is left behind, and by how relevant the side is.
+    fn importance(&self, side: usize, flux: DVec3) -> f64 {
+        let shares = (0..3).filter(|&c| self.emitted[c] > 0.0).map(|c| flux[c] / self.emitted[c]);
+        self.tracer.patches.relevance[side / 2] * shares.sum::<f64>()
+    }
+
+    /// How much more (or less) of what is relevant is unshot than of everything, each in proportion to the light it got from light
+    /// sources; 1 with equal weights.
+    fn relevant_unshot(&self) -> f64 {
+        let weigh = |flux: &dyn Fn(usize) -> DVec3| -> [f64; 2] {
+            (0..self.incident.len()).fold([0.0; 2], |[all, relevant], side| {
+                let flux = flux(side).element_sum();
+                [all + flux, relevant + self.tracer.patches.relevance[side / 2] * flux]
+            })
+        };
+        let (unshot, direct) = (weigh(&|side| self.unshot(side)), weigh(&|side| self.direct[side]));
+        if unshot[0] > 0.0 && direct[1] > 0.0 { unshot[1] / unshot[0] * (direct[0] / direct[1]) } else { 1.0 }
     }
 
     /// Shoots with `rays` rays for the light that is unshot at the start, and in the same density thereafter, until the share
@@ -84,14 +98,14 @@ impl<'a> Run<'a> {
     /// # Errors
     /// [`Error::Unsolvable`] when the light does not decrease.
     pub fn refine(&mut self, rays: u64, limit: f64, progress: &Progress) -> Result<()> {
-        let initial: f64 = (0..self.incident.len()).map(|s| self.importance(self.unshot(s))).sum();
+        let initial: f64 = (0..self.incident.len()).map(|s| self.importance(s, self.unshot(s))).sum();
         let density = rays as f64 / initial;
         let total_steps = 1000.0;
         let bar = progress.stage("radiosity", total_steps as u64);
         loop {
             let ledger = self.ledger();
             debug_assert!(ledger.imbalance() < 1e-6, "energy is not conserved: {ledger:?}");
-            let share = ledger.unshot_share();
+            let share = ledger.unshot_share() * self.relevant_unshot();
             if share < limit || progress.stopped() {
                 break;
             }
@@ -119,7 +133,7 @@ impl<'a> Run<'a> {
     fn next_shots(&self, density: f64) -> Vec<Shot> {
         let mut order: Vec<(f64, u32)> = (0..self.incident.len())
             .into_par_iter()
-            .map(|side| (self.importance(self.unshot(side)), side as u32))
+            .map(|side| (self.importance(side, self.unshot(side)), side as u32))
             .filter(|&(importance, _)| importance > 0.0)
             .collect();
         order.par_sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
@@ -171,7 +185,7 @@ impl<'a> Run<'a> {
         for (side, (incident, direct)) in self.incident.iter().zip(&self.direct).enumerate() {
             lost += (1.0 - self.reflectance(side)) * (incident - direct);
         }
-        let unshot = DVec3::from_array(ledger.unshot);
+        let unshot = DVec3::from_array(ledger.unshot) * self.relevant_unshot();
         let factor = DVec3::from_array(std::array::from_fn(|c| if lost[c] > 0.0 { unshot[c] / lost[c] } else { 0.0 }));
         self.incident.iter().zip(&self.direct).map(|(i, d)| i + factor * (i - d)).collect()
     }

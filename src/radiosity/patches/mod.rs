@@ -14,7 +14,7 @@ use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
 use crate::error::{Error, Result};
-use crate::radiosity::RadiosityScene;
+use crate::radiosity::{Focus, RadiosityScene};
 use crate::shading::SurfacePoint;
 use crate::simplify::{Cluster, SimplifiedGeometry, TriangleSource};
 use charts::{Charts, Frame};
@@ -41,6 +41,8 @@ pub(super) struct Patches {
     pieces: Vec<Piece>,
     /// Area of one side of each patch.
     pub area: Vec<f64>,
+    /// What counts how much, 0..=1; see [`Focus`].
+    pub relevance: Vec<f64>,
     exposure: Exposure,
     /// Diameter of each patch.
     pub diameter: Vec<f32>,
@@ -136,6 +138,7 @@ impl Patches {
             first_piece: vec![0],
             pieces: Vec::new(),
             area: Vec::new(),
+            relevance: Vec::new(),
             exposure: Exposure::everything(0),
             diameter: Vec::new(),
             normals,
@@ -146,12 +149,19 @@ impl Patches {
             patches.append(geometry, grid, triangles, part);
         }
         patches.exposure = Exposure::everything(2 * patches.len());
+        patches.relevance = vec![1.0; patches.len()];
         Ok(patches)
     }
 
     /// Finds out which parts of the patches are covered and leaves these out of all that follows.
     pub fn leave_out_covered(&mut self, input: &RadiosityScene<'_>, seed: u32) {
         self.exposure = Exposure::find(input, self, seed);
+    }
+
+    /// Weighs patches by their closeness to `focus`.
+    pub fn weigh(&mut self, geometry: &SimplifiedGeometry, focus: &Focus) {
+        let centre = |patch: u32| self.point(geometry, patch, [0.5, 0.5]).position;
+        self.relevance = (0..self.len() as u32).into_par_iter().map(|p| focus.weight(centre(p))).collect();
     }
 
     /// Area of the part of a side that lies open.
