@@ -47,7 +47,8 @@ pub struct Difference {
 }
 
 impl Comparison {
-    fn merge(mut self, other: Comparison) -> Comparison {
+    /// Both together.
+    pub fn merge(mut self, other: Comparison) -> Comparison {
         self.rays += other.rays;
         self.misses += other.misses;
         self.identical += other.identical;

@@ -14,7 +14,6 @@ mod tree;
 #[cfg(test)]
 mod tests;
 
-
 use glam::Vec3;
 
 use crate::backend::Hit;
