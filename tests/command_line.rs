@@ -173,9 +173,16 @@ fn layers_and_header_of_an_exr() {
     let (all, header) = image::read_with_metadata(&bench.path("all.exr")).unwrap();
     let colours = ["hires", "lores", "hires_dev", "lores_dev", "albedo"];
     let mut channels: Vec<String> = colours.iter().flat_map(|l| ["R", "G", "B"].map(|b| format!("{l}.{b}"))).collect();
-    channels.extend(["R", "G", "B", "normal.X", "normal.Y", "normal.Z", "depth.Z", "trials.hires", "trials.lores"].map(String::from));
+    channels.extend(
+        ["R", "G", "B", "normal.X", "normal.Y", "normal.Z", "depth.Z", "trials.hires", "trials.lores"]
+            .map(String::from),
+    );
     for channel in &channels {
-        assert!(all.channel(channel).is_some(), "{channel} in {:?}", all.channels().iter().map(|c| &c.name).collect::<Vec<_>>());
+        assert!(
+            all.channel(channel).is_some(),
+            "{channel} in {:?}",
+            all.channels().iter().map(|c| &c.name).collect::<Vec<_>>()
+        );
     }
     let at = |name: &str, i: usize| all.channel(name).unwrap()[i];
     for i in 0..24 * 16 {
@@ -185,7 +192,9 @@ fn layers_and_header_of_an_exr() {
         assert_eq!((at("trials.hires", i), at("trials.lores", i)), (4.0, 4.0));
     }
     assert_eq!(header.get("gsii:method"), Some(&Value::Text("gsii".into())));
-    for key in ["gsii:r_thresh", "gsii:seed", "gsii:error.lores", "gsii:error.bias", "gsii:error.bias_ci", "gsii:camera"] {
+    for key in
+        ["gsii:r_thresh", "gsii:seed", "gsii:error.lores", "gsii:error.bias", "gsii:error.bias_ci", "gsii:camera"]
+    {
         assert!(header.get(key).is_some(), "{key}");
     }
     bench.render(&["-o", "few.exr", "--layers", "lores,depth"]);
@@ -283,7 +292,20 @@ fn ctrl_c_before_the_first_trial_writes_nothing() {
 fn a_time_limit_is_kept() {
     let bench = Bench::new();
     let start = Instant::now();
-    let arguments = ["render", "room.gltf", "-o", "a.exr", "--width", "64", "--height", "48", "--spp", "10000000", "--stats", "a.json"];
+    let arguments = [
+        "render",
+        "room.gltf",
+        "-o",
+        "a.exr",
+        "--width",
+        "64",
+        "--height",
+        "48",
+        "--spp",
+        "10000000",
+        "--stats",
+        "a.json",
+    ];
     let output = bench.gsii(&[&arguments[..], &["--time-limit", "1"]].concat());
     assert!(output.status.success(), "{}", stderr(&output));
     assert!(start.elapsed() < Duration::from_secs(60));

@@ -106,7 +106,8 @@ fn interiors_agree_with_their_references() {
             .args([&shared.join(format!("scenes/{name}.glb")), &diffuse])
             .status();
         assert!(made.unwrap().success());
-        let halves = ["a", "b"].map(|half| image::read(&shared.join(format!("refs/images/{name}.{half}.exr"))).unwrap());
+        let halves =
+            ["a", "b"].map(|half| image::read(&shared.join(format!("refs/images/{name}.{half}.exr"))).unwrap());
         let film = film(&diffuse, Method::Gsii, [256, 144], 256);
         let image = as_image(&film);
         let cross = image::compare_halves([&halves[0], &halves[1]], &image).unwrap();

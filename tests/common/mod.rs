@@ -16,7 +16,8 @@ use statrs::distribution::{ContinuousCDF, Normal};
 /// The folder `shared` beside the project, or beside a folder that holds it; prints that it skips where there is none.
 pub fn shared() -> Option<PathBuf> {
     let project = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
-    let found = project.ancestors().skip(1).take(2).map(|folder| folder.join("shared")).find(|f| f.join("scenes").is_dir());
+    let found =
+        project.ancestors().skip(1).take(2).map(|folder| folder.join("shared")).find(|f| f.join("scenes").is_dir());
     if found.is_none() {
         println!("skipped: there is no folder ../shared with scenes and references");
     }
@@ -34,7 +35,8 @@ pub struct Body {
 impl Body {
     /// An axis-parallel box between two corners, its front faces outside, or inside for a room.
     pub fn block(low: [f32; 3], high: [f32; 3], inside: bool, reflectance: f32, radiance: f32) -> Body {
-        let positions = (0..8).map(|i| std::array::from_fn(|axis| if i >> axis & 1 == 1 { high[axis] } else { low[axis] }));
+        let positions =
+            (0..8).map(|i| std::array::from_fn(|axis| if i >> axis & 1 == 1 { high[axis] } else { low[axis] }));
         // Corners of each face, counter-clockwise from outside; bit k of a corner's number is its side along axis k.
         let faces = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
         let triangles = faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]);
@@ -49,7 +51,8 @@ pub fn gltf(bodies: &[Body], eye: [f32; 3]) -> String {
     let (mut views, mut accessors, mut meshes, mut materials, mut nodes) = (vec![], vec![], vec![], vec![], vec![]);
     for (i, body) in bodies.iter().enumerate() {
         let low: [f32; 3] = std::array::from_fn(|a| body.positions.iter().map(|p| p[a]).fold(f32::INFINITY, f32::min));
-        let high: [f32; 3] = std::array::from_fn(|a| body.positions.iter().map(|p| p[a]).fold(f32::NEG_INFINITY, f32::max));
+        let high: [f32; 3] =
+            std::array::from_fn(|a| body.positions.iter().map(|p| p[a]).fold(f32::NEG_INFINITY, f32::max));
         views.push(json!({"buffer": 0, "byteOffset": bytes.len(), "byteLength": 12 * body.positions.len()}));
         bytes.extend(body.positions.as_flattened().iter().flat_map(|x| x.to_le_bytes()));
         views.push(json!({"buffer": 0, "byteOffset": bytes.len(), "byteLength": 12 * body.triangles.len()}));
@@ -67,7 +70,8 @@ pub fn gltf(bodies: &[Body], eye: [f32; 3]) -> String {
         nodes.push(json!({"mesh": i}));
     }
     nodes.push(json!({"name": "eye", "camera": 0, "translation": eye}));
-    let uri = format!("data:application/octet-stream;base64,{}", base64::engine::general_purpose::STANDARD.encode(&bytes));
+    let uri =
+        format!("data:application/octet-stream;base64,{}", base64::engine::general_purpose::STANDARD.encode(&bytes));
     let root: Value = json!({
         "asset": {"version": "2.0"},
         "extensionsUsed": ["KHR_materials_specular", "KHR_materials_emissive_strength"],
@@ -167,7 +171,8 @@ impl Estimate {
             let mean = |m: [f64; 3]| m.iter().sum::<f64>() / 3.0;
             sum += mean(pixel.hires.mean()) + mean(pixel.lores.mean());
             count += 1.0;
-            let half = |pass: &gsii::render::film::PixelSum| pass.halves().map_or(0.0, |(a, b)| 0.5 * (mean(a) - mean(b)));
+            let half =
+                |pass: &gsii::render::film::PixelSum| pass.halves().map_or(0.0, |(a, b)| 0.5 * (mean(a) - mean(b)));
             if pixel.hires.trials() == pixel.lores.trials() {
                 square += (half(&pixel.hires) + half(&pixel.lores)).powi(2);
             } else {
