@@ -203,7 +203,7 @@ impl Source<'_> {
         let mut hits = vec![Hit::MISS; views.len()];
         self.detailed.closest(&views, Visible::All, Coherence::Coherent, &mut hits);
         let seen = numbers.zip(views.iter().zip(&hits)).filter(|(_, (_, hit))| hit.is_hit());
-        seen.filter_map(|(i, (view, hit))| self.from_hit(kind, view, hit, sobol(i, 1, stream))).collect()
+        seen.filter_map(|(i, (view, hit))| self.leaving(kind, view, hit, sobol(i, 1, stream))).collect()
     }
 
     /// Neighbours in number are neighbours in the image; every [`ROW`] squared of them fill it anew.
@@ -214,7 +214,7 @@ impl Source<'_> {
         self.camera.ray(film, self.camera.aspect.unwrap_or(1.5))
     }
 
-    fn from_hit(&self, kind: RayKind, view: &Ray, hit: &Hit, u: [f32; 4]) -> Option<Ray> {
+    fn leaving(&self, kind: RayKind, view: &Ray, hit: &Hit, u: [f32; 4]) -> Option<Ray> {
         let point = SurfacePoint::new(self.scene, hit);
         let normal = point.geometric_normal;
         let normal = if normal.dot(view.direction) < 0.0 { normal } else { -normal };
