@@ -287,6 +287,7 @@ impl Average {
             patches: patches.len(),
             patch_size: patches.size as f32,
             map: patches.map,
+            normals: patches.normals,
             rays: self.rays,
             shots: self.shots,
             error,
