@@ -22,7 +22,7 @@ use crate::render::{FarField, Nearness, World};
 use crate::scene::alpha::AlphaFilter;
 use crate::scene::{Camera, Scene};
 use crate::shading::Lobes;
-use crate::simplify::{self, Simplified, SimplifiedGeometry, SimplifyParams};
+use crate::simplify::{self, Simplified, SimplifiedGeometry, SimplifyParams, TriangleSource};
 
 /// A scene, prepared for one method: acceleration structures, simplified scene, radiosity solution.
 pub struct Prepared {
