@@ -165,7 +165,7 @@ impl Tracer<'_> {
                 let shot = &shots[at];
                 let index = u64::from(shot.rays) - (ends[at] - k);
                 let s = sampling::sobol(index as u32, 0, shot.stream);
-                let point = self.patches.point(geometry, shot.side / 2, [s[0], s[1]]);
+                let point = self.patches.open_point(geometry, shot.side, [s[0], s[1]]);
                 let local = sampling::cosine_hemisphere(Vec2::new(s[2], s[3]));
                 let direction = sampling::basis(side_normal(&point, shot.side)) * local;
                 let id = u64::from(shot.stream) << 32 | index;
