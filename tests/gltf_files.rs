@@ -1,4 +1,6 @@
-//! Real and hostile glTF files, where they are at hand: `../shared/scenes` beside the project, or `GSII_SCENES`.
+//! Real and hostile glTF files, where they are at hand: `../shared/scenes` beside the project.
+
+mod common;
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -8,15 +10,7 @@ use serde::Deserialize;
 
 /// The folder of test scenes; says so on standard output and gives `None` where it is absent.
 fn scenes() -> Option<PathBuf> {
-    let folder = match std::env::var_os("GSII_SCENES") {
-        Some(folder) => PathBuf::from(folder),
-        None => PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/scenes"),
-    };
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    println!("skipped: no test scenes at {}", folder.display());
-    None
+    common::shared().map(|folder| folder.join("scenes"))
 }
 
 #[derive(Deserialize)]

@@ -10,6 +10,9 @@ use super::{Coherence, Hit, PartKind, Ray, RayScene, TriangleSet, Visible};
 const U: f64 = f32::EPSILON as f64 / 2.0;
 /// Rays per batch.
 const BATCH: usize = 4096;
+/// Points along each axis of the rounding bound at which a filter is asked whether it would refuse a hit. Many, since what
+/// is present with a probability (blended surfaces) is decided for each point by itself.
+const PROBES: u32 = 64;
 /// Differences kept to be shown.
 const EXAMPLES: usize = 16;
 
@@ -47,7 +50,8 @@ pub struct Difference {
 }
 
 impl Comparison {
-    fn merge(mut self, other: Comparison) -> Comparison {
+    /// Both together.
+    pub fn merge(mut self, other: Comparison) -> Comparison {
         self.rays += other.rays;
         self.misses += other.misses;
         self.identical += other.identical;
@@ -237,10 +241,12 @@ impl<'a> Judge<'a> {
         let kind = self.kind(hit.triangle);
         let grazing = kind == PartKind::OneSided && met.facing >= -dfacing;
         let doubtful = match (kind, &self.set.filter) {
-            (PartKind::Filtered, Some(filter)) => [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0), (0.0, 0.0)]
-                .into_iter()
-                .map(|(du, dv)| ((met.weights[1] + du * dw) as f32, (met.weights[2] + dv * dw) as f32))
-                .any(|(u, v)| !filter.accepts(hit.triangle, u, v)),
+            (PartKind::Filtered, Some(filter)) => {
+                let offset = |i: u32| (2.0 * f64::from(i) / f64::from(PROBES - 1) - 1.0) * dw;
+                (0..PROBES * PROBES)
+                    .map(|i| (met.weights[1] + offset(i % PROBES), met.weights[2] + offset(i / PROBES)))
+                    .any(|(u, v)| !filter.accepts(hit.triangle, u as f32, v as f32))
+            }
             _ => false,
         };
         if outline || end || grazing || doubtful { Verdict::Borderline } else { Verdict::Unexplained }

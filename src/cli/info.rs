@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use super::options::{MethodOptions, SceneOptions, Talk, load};
+use super::options::{MethodOptions, SceneOptions, Talk, load, set_threads};
 use crate::error::Result;
 use crate::pipeline::{Prepared, Stats, choose_camera};
 use crate::scene::{LightKind, Projection, Scene};
@@ -28,7 +28,7 @@ pub struct Options {
 /// # Errors
 /// As loading and preparing the scene.
 pub fn run(options: &Options) -> Result<ExitCode> {
-    options.method.set_threads()?;
+    set_threads(options.method.threads)?;
     let progress = options.talk.progress();
     let mut stats = Stats::new();
     let scene = load(&options.scene, &mut stats)?;
@@ -95,7 +95,10 @@ fn print_plan(prepared: &Prepared, stats: &Stats) {
         println!("  simplified  {} surfaces, {} triangles", count.normal + count.simple, far.geometry.triangles.len());
     }
     println!("  patches     {} of size {:.4}", stats.counts.patches, settings.patch_size.unwrap_or(0.0));
-    println!("  radiosity   error {:.4}, {} shots, {} rays", stats.error.radiosity, far.solution.shots, far.solution.rays);
+    println!(
+        "  radiosity   error {:.4}, {} shots, {} rays",
+        stats.error.radiosity, far.solution.shots, far.solution.rays
+    );
     let s = &stats.seconds;
     println!("  seconds     simplify {:.2}, build {:.2}, radiosity {:.2}", s.simplify, s.build, s.radiosity);
 }

@@ -131,21 +131,21 @@ impl MethodOptions {
             ..default
         }
     }
+}
 
-    /// Sets the size of rayon's pool.
-    ///
-    /// # Errors
-    /// Zero threads.
-    pub fn set_threads(&self) -> Result<()> {
-        if self.threads == Some(0) {
-            return Err(Error::Usage("--threads must be at least 1".to_owned()));
-        }
-        if let Some(n) = self.threads {
-            // Fails only when the pool already exists, which keeps its size.
-            let _ = rayon::ThreadPoolBuilder::new().num_threads(n).build_global();
-        }
-        Ok(())
+/// Sets the size of rayon's pool, where `threads` says one.
+///
+/// # Errors
+/// Zero threads.
+pub fn set_threads(threads: Option<usize>) -> Result<()> {
+    if threads == Some(0) {
+        return Err(Error::Usage("--threads must be at least 1".to_owned()));
     }
+    if let Some(n) = threads {
+        // Fails only when the pool already exists, which keeps its size.
+        let _ = rayon::ThreadPoolBuilder::new().num_threads(n).build_global();
+    }
+    Ok(())
 }
 
 /// Reads a scene, noting time and warnings.

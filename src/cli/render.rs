@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
 
-use super::options::{MethodOptions, SceneOptions, Talk, load};
+use super::options::{MethodOptions, SceneOptions, Talk, load, set_threads};
 use crate::error::{Error, Result};
 use crate::image::{self, Metadata, ViewTransform, WriteOptions};
 use crate::pipeline::{Method, Prepared, Stats, choose_camera};
@@ -92,7 +92,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     for path in &options.output {
         image::check_writable(path)?;
     }
-    options.method.set_threads()?;
+    set_threads(options.method.threads)?;
     let progress = options.talk.progress();
     stop_on_ctrl_c(&progress);
 
@@ -251,7 +251,8 @@ impl Options {
             s.hires,
             s.lores
         ));
-        let mut errors = format!("noise {:.2} % (HIRES {:.2}, LORES {:.2})", 100.0 * e.total, 100.0 * e.hires, 100.0 * e.lores);
+        let mut errors =
+            format!("noise {:.2} % (HIRES {:.2}, LORES {:.2})", 100.0 * e.total, 100.0 * e.hires, 100.0 * e.lores);
         if let (Some(bias), Some(ci)) = (e.bias, e.bias_ci) {
             errors += &format!(", bias of the mean {:+.2} +- {:.2} %", 100.0 * bias, 100.0 * ci);
         }

@@ -1,7 +1,7 @@
 //! Images in and out through OpenImageIO, view transform, error metrics.
 //!
 //! Inside the program an [`Image`] is linear: Rec. 709 primaries, scene-referred, named float channels. What the file
-//! needs instead (integers, a tone curve, sRGB encoding) is done on the way out by [`write`] and undone by [`read`] as
+//! needs instead (integers, a tone curve, sRGB encoding) is done on the way out by [`write()`] and undone by [`read`] as
 //! far as it can be.
 
 mod buffer;

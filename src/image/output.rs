@@ -11,7 +11,7 @@ use super::view::ViewTransform;
 use crate::error::{Error, Result};
 use crate::sampling::{hash_all, unit};
 
-/// What [`write`] does to the values on their way to the file.
+/// What [`write()`] does to the values on their way to the file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct WriteOptions {
     /// Stops by which the image is brightened. Only in formats for screens; linear formats keep the radiance.
@@ -107,7 +107,7 @@ fn failure(path: &Path, reason: impl ToString) -> Error {
     Error::Output { path: path.to_owned(), reason: reason.to_string() }
 }
 
-/// Finds out before the work whether [`write`] can succeed: extension known, folder there and writable, nothing in the
+/// Finds out before the work whether [`write()`] can succeed: extension known, folder there and writable, nothing in the
 /// way, the format willing. A tiny image is written beside the target and removed.
 pub fn check_writable(path: &Path) -> Result<()> {
     let mut probe = Image::new(16, 16);

@@ -1,7 +1,7 @@
 //! Direct light: choosing a light source and a point on it (next-event estimation).
 //!
-//! Emitting triangles, and rectangles made of two, are sampled uniformly in solid angle ([`spherical`]); which light is
-//! decided by a tree over lights ([`tree`]) in proportion to what each may contribute.
+//! Emitting triangles, and rectangles made of two, are sampled uniformly in solid angle (`spherical`); which light is
+//! decided by a tree over lights (`tree`) in proportion to what each may contribute.
 
 mod area;
 mod bounds;
@@ -13,7 +13,6 @@ mod tree;
 
 #[cfg(test)]
 mod tests;
-
 
 use glam::Vec3;
 

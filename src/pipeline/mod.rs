@@ -3,6 +3,7 @@
 pub mod auto;
 pub mod settings;
 pub mod stats;
+pub mod validate;
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -138,9 +139,8 @@ impl Far {
         stats.seconds.simplify += start.elapsed().as_secs_f64();
 
         let start = Instant::now();
-        let sources = geometry.sources.clone();
-        let filter = SimplifiedFilter { sources, scene_filter: Arc::clone(filter) };
-        let rays = backend.build(&TriangleSet { filter: Some(Arc::new(filter)), ..geometry.triangle_set() })?;
+        let filter = geometry.filter(Arc::clone(filter));
+        let rays = backend.build(&TriangleSet { filter: Some(filter), ..geometry.triangle_set() })?;
         let nearness = (!complete).then(|| {
             let reach = 1.5 * settings.r_thresh();
             let clusters = simplified.clusters.iter().map(|c| c.bounds.union(c.equivalent_box.bounds()));
@@ -171,21 +171,6 @@ fn is_plain(scene: &Scene, source: &TriangleSource) -> bool {
     }
 }
 
-/// Puts alpha tests of the simplified geometry to the scene's own filter.
-struct SimplifiedFilter {
-    sources: Vec<TriangleSource>,
-    scene_filter: Arc<dyn HitFilter>,
-}
-
-impl HitFilter for SimplifiedFilter {
-    fn accepts(&self, triangle: u32, u: f32, v: f32) -> bool {
-        match self.sources[triangle as usize] {
-            TriangleSource::Scene { triangle } => self.scene_filter.accepts(triangle, u, v),
-            TriangleSource::BoxFace { .. } => true,
-        }
-    }
-}
-
 impl BackendKind {
     /// Starts the library.
     ///
@@ -210,8 +195,7 @@ pub fn choose_camera<'a>(scene: &'a Scene, wanted: Option<&str>) -> Result<&'a C
     let by_name = scene.cameras.iter().find(|c| c.name == wanted);
     let by_number = || wanted.parse::<usize>().ok().and_then(|i| scene.cameras.get(i));
     by_name.or_else(by_number).ok_or_else(|| {
-        let names: Vec<String> =
-            scene.cameras.iter().enumerate().map(|(i, c)| format!("{i} ({})", c.name)).collect();
+        let names: Vec<String> = scene.cameras.iter().enumerate().map(|(i, c)| format!("{i} ({})", c.name)).collect();
         Error::Usage(format!("{} has no camera '{wanted}'; it has {}", scene.name, names.join(", ")))
     })
 }

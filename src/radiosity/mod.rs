@@ -1,7 +1,7 @@
 //! Progressive refinement radiosity on the simplified scene, with form factors by ray casting.
 //!
-//! [`solve`] cuts the geometry into [`patches`], finds what they reflect ([`optics`]), lights them ([`direct`] by shadow rays or
-//! [`emit`] by shooting) and lets the largest unshot flux shoot first ([`refine`], [`shoot`]). Everything is done twice with
+//! [`solve`] cuts the geometry into `patches`, finds what they reflect (`optics`), lights them (`direct` by shadow rays or
+//! `emit` by shooting) and lets the largest unshot flux shoot first (`refine`, `shoot`). Everything is done twice with
 //! independent random numbers, so that the [`Solution`] knows its statistical error.
 
 mod direct;

@@ -12,7 +12,6 @@ use crate::scene::{Material, Scene};
 use crate::shading::{Bsdf, Lobes, SurfacePoint};
 use crate::simplify::TriangleSource;
 
-
 /// Points at which a material that varies over a patch is looked at.
 const POINTS: u32 = 16;
 /// Reflectance up to which rounding is forgiven.

@@ -93,10 +93,13 @@ pub fn develop(film: &Film, layers: &[Layer]) -> Image {
                 }
             }
             // Depth of the background is infinite, as compositing tools expect.
-            Layer::Depth => image.push("depth.Z", scalar(&|p| match p.feature.hits {
-                0 => f32::INFINITY,
-                hits => p.feature.depth / hits as f32,
-            })),
+            Layer::Depth => image.push(
+                "depth.Z",
+                scalar(&|p| match p.feature.hits {
+                    0 => f32::INFINITY,
+                    hits => p.feature.depth / hits as f32,
+                }),
+            ),
             Layer::Trials => {
                 image.push("trials.hires", scalar(&|p| p.hires.trials() as f32));
                 image.push("trials.lores", scalar(&|p| p.lores.trials() as f32));

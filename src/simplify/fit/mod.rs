@@ -2,7 +2,7 @@
 //!
 //! Clusters interpenetrate, and a ray must meet one of them only. Building one acceleration structure for each of thousands
 //! of clusters wastes time on commits, skipping foreign hits wastes rays; so all clusters of a pass go into one scene in which
-//! each is moved to a cell of its own, turned into its box's axes and scaled to unit size ([`Stage`]). Rays end before they
+//! each is moved to a cell of its own, turned into its box's axes and scaled to unit size (`Stage`). Rays end before they
 //! leave the cell. Unit size also makes error bounds the same for a thumbtack and a tree.
 
 pub mod flux;

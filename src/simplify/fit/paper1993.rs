@@ -1,7 +1,7 @@
 //! The paper's box, to the letter of its pseudo-code.
 //!
 //! What the pseudo-code leaves open: patches that no ray hit have no reflectance ([`PaperFit::reflectance`] is `None` there;
-//! [`fill_patches`](super::fill_patches) takes the mean of their face, else that of the cluster). The two faces across an axis
+//! `fill_patches` takes the mean of their face, else that of the cluster). The two faces across an axis
 //! see the same silhouette, so their fractions are averaged. A length can come out as zero (plates without thickness, GSII-007;
 //! a diagonal sheet, GSII-008); [`PaperFit::lengths`] says so, the box itself gets a least thickness.
 

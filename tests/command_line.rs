@@ -1,0 +1,373 @@
+//! The program as a user meets it: exit codes, messages, files.
+
+mod common;
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use gsii::image::{self, Value};
+
+/// A folder with a small scene.
+struct Bench {
+    folder: tempfile::TempDir,
+}
+
+impl Bench {
+    fn new() -> Bench {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("room.gltf"), common::lit_room()).unwrap();
+        Bench { folder }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn command(&self, arguments: &[&str]) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_gsii"));
+        command.current_dir(self.folder.path()).args(arguments).stdin(Stdio::null());
+        command
+    }
+
+    fn gsii(&self, arguments: &[&str]) -> Output {
+        self.command(arguments).output().unwrap()
+    }
+
+    /// A small rendering; panics with its messages if it fails.
+    fn render(&self, arguments: &[&str]) -> Output {
+        let small = ["render", "room.gltf", "--width", "24", "--height", "16", "--spp", "4", "--measure-bias", "1024"];
+        let output = self.gsii(&[&small, arguments].concat());
+        assert!(output.status.success(), "{arguments:?}: {}", stderr(&output));
+        output
+    }
+
+    fn files(&self) -> Vec<String> {
+        let mut names: Vec<String> = std::fs::read_dir(self.folder.path())
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect();
+        names.sort();
+        names
+    }
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8(output.stderr.clone()).unwrap()
+}
+
+/// Asserts exit code 2 and one line that holds all of `words`, and gives it.
+fn refused(output: &Output, words: &[&str]) {
+    let text = stderr(output);
+    assert_eq!(output.status.code(), Some(2), "{text}");
+    let lines: Vec<&str> = text.lines().collect();
+    assert_eq!(lines.len(), 1, "one line: {text}");
+    for word in words {
+        assert!(text.contains(word), "'{word}' in: {text}");
+    }
+}
+
+#[test]
+fn files_that_are_no_scenes_are_refused_in_one_line() {
+    let bench = Bench::new();
+    std::fs::create_dir(bench.path("folder.glb")).unwrap();
+    std::fs::write(bench.path("empty.glb"), "").unwrap();
+    std::fs::write(bench.path("garbage.glb"), [0xa5; 4096]).unwrap();
+    std::fs::write(bench.path("garbage.gltf"), "this is not JSON").unwrap();
+    let glb = common::lit_room();
+    std::fs::write(bench.path("cut.gltf"), &glb[..glb.len() / 2]).unwrap();
+    for name in ["missing.glb", "folder.glb", "empty.glb", "garbage.glb", "garbage.gltf", "cut.gltf"] {
+        for command in [&["render", name, "-o", "out.exr"][..], &["info", name], &["validate", name]] {
+            let before = bench.files();
+            refused(&bench.gsii(command), &[name]);
+            assert_eq!(bench.files(), before, "{command:?} leaves nothing behind");
+        }
+    }
+}
+
+#[test]
+fn options_that_make_no_sense_are_refused() {
+    let bench = Bench::new();
+    let before = bench.files();
+    let cases: [(&[&str], &str); 13] = [
+        (&["--camera", "nobody"], "nobody"),
+        (&["--beta", "2"], "--beta"),
+        (&["--r-thresh=-1"], "--r-thresh"),
+        (&["--r-thresh", "NaN"], "--r-thresh"),
+        (&["--patch-size", "0"], "--patch-size"),
+        (&["--unshot", "0"], "--unshot"),
+        (&["--width", "0"], "--width"),
+        (&["--threads", "0"], "--threads"),
+        (&["--spp", "0"], "trials"),
+        (&["--min-trials", "8", "--max-trials", "4"], "--min-trials"),
+        (&["--error", "0"], "error"),
+        (&["--time-limit", "0"], "--time-limit"),
+        (&["-o", "out.xyz"], "out.xyz"),
+    ];
+    for (arguments, word) in cases {
+        refused(&bench.gsii(&[&["render", "room.gltf", "-o", "out.exr"], arguments].concat()), &[word]);
+    }
+    // What the option parser refuses by itself comes with its usage: more lines, the same exit code.
+    for arguments in [
+        &["render", "room.gltf"][..],
+        &["render", "room.gltf", "-o", "out.exr", "--method", "magic"],
+        &["render", "room.gltf", "-o", "out.exr", "--r-thresh", "wide"],
+        &["render", "room.gltf", "-o", "out.exr", "--layers", "hires,colour"],
+        &["render", "room.gltf", "-o", "out.exr", "--spp", "4", "--error", "0.1"],
+        &["paint"],
+        &[],
+    ] {
+        let output = bench.gsii(arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        assert!(!stderr(&output).contains("panicked"));
+    }
+    assert_eq!(bench.files(), before);
+    assert!(bench.gsii(&["--help"]).status.success());
+    assert!(bench.gsii(&["--version"]).status.success());
+}
+
+#[test]
+fn places_that_cannot_be_written_are_noticed_before_the_work() {
+    let bench = Bench::new();
+    std::fs::create_dir(bench.path("there.exr")).unwrap();
+    let before = bench.files();
+    for target in ["no/such/folder/out.exr", "there.exr", "/proc/out.exr"] {
+        let start = Instant::now();
+        let output = bench.gsii(&["render", "room.gltf", "-o", target, "--spp", "100000"]);
+        assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+        assert!(stderr(&output).contains(target) && stderr(&output).lines().count() == 1, "{}", stderr(&output));
+        assert!(start.elapsed() < Duration::from_secs(20), "found out before rendering");
+    }
+    assert_eq!(bench.files(), before);
+}
+
+#[test]
+fn common_formats_are_written_and_can_be_read() {
+    let bench = Bench::new();
+    let names = ["a.exr", "a.hdr", "a.tif", "a.pfm", "a.png", "a.jpg", "a.webp", "a.tga", "a.bmp"];
+    let writable = image::writable_extensions().unwrap();
+    let names = names.into_iter().filter(|n| {
+        let extension = n.trim_start_matches("a.");
+        let known = writable.iter().any(|w| w == extension);
+        if !known {
+            println!("skipped {extension}: this OpenImageIO does not write it");
+        }
+        known
+    });
+    let names: Vec<&str> = names.collect();
+    assert!(names.contains(&"a.exr") && names.contains(&"a.png"));
+    let outputs: Vec<&str> = names.iter().flat_map(|n| ["-o", *n]).collect();
+    bench.render(&outputs);
+    for name in names {
+        let read = image::read(&bench.path(name)).unwrap();
+        assert_eq!((read.width(), read.height()), (24, 16), "{name}");
+        let bands = read.rgb_or_grey().unwrap();
+        assert!(bands[0].iter().any(|&v| v > 0.0), "{name} is not black");
+    }
+}
+
+#[test]
+fn layers_and_header_of_an_exr() {
+    let bench = Bench::new();
+    bench.render(&["-o", "all.exr", "-o", "few.exr"]);
+    let (all, header) = image::read_with_metadata(&bench.path("all.exr")).unwrap();
+    let colours = ["hires", "lores", "hires_dev", "lores_dev", "albedo"];
+    let mut channels: Vec<String> = colours.iter().flat_map(|l| ["R", "G", "B"].map(|b| format!("{l}.{b}"))).collect();
+    channels.extend(
+        ["R", "G", "B", "normal.X", "normal.Y", "normal.Z", "depth.Z", "trials.hires", "trials.lores"]
+            .map(String::from),
+    );
+    for channel in &channels {
+        assert!(
+            all.channel(channel).is_some(),
+            "{channel} in {:?}",
+            all.channels().iter().map(|c| &c.name).collect::<Vec<_>>()
+        );
+    }
+    let at = |name: &str, i: usize| all.channel(name).unwrap()[i];
+    for i in 0..24 * 16 {
+        let sum = at("hires.G", i) + at("lores.G", i);
+        // Three values rounded to f32.
+        assert!((at("G", i) - sum).abs() <= 2.0 * f32::EPSILON * sum, "R,G,B = HIRES + LORES");
+        assert_eq!((at("trials.hires", i), at("trials.lores", i)), (4.0, 4.0));
+    }
+    assert_eq!(header.get("gsii:method"), Some(&Value::Text("gsii".into())));
+    for key in
+        ["gsii:r_thresh", "gsii:seed", "gsii:error.lores", "gsii:error.bias", "gsii:error.bias_ci", "gsii:camera"]
+    {
+        assert!(header.get(key).is_some(), "{key}");
+    }
+    bench.render(&["-o", "few.exr", "--layers", "lores,depth"]);
+    let few = image::read(&bench.path("few.exr")).unwrap();
+    let mut names: Vec<&str> = few.channels().iter().map(|c| c.name.as_str()).collect();
+    names.sort_unstable();
+    assert_eq!(names, ["B", "G", "R", "depth.Z", "lores.B", "lores.G", "lores.R"]);
+}
+
+#[test]
+fn statistics_hold_every_promised_key() {
+    let bench = Bench::new();
+    for method in ["gsii", "pmm", "mcpt", "radiosity"] {
+        bench.render(&["-o", "a.exr", "--stats", "a.json", "--method", method]);
+        let stats: serde_json::Value = serde_json::from_slice(&std::fs::read(bench.path("a.json")).unwrap()).unwrap();
+        let promised = [
+            ("seconds", "load simplify build radiosity hires lores write total"),
+            ("rays", "simplify radiosity hires lores"),
+            ("counts", "triangles surfaces normal complex simple clusters patches"),
+            ("error", "hires lores radiosity fit"),
+        ];
+        for (group, keys) in promised {
+            for key in keys.split(' ') {
+                assert!(stats[group][key].is_number(), "{method}: {group}.{key} in {stats}");
+            }
+        }
+        for key in ["bias", "bias_ci"] {
+            let measured = stats["error"][key].is_number();
+            assert_eq!(measured, matches!(method, "gsii" | "pmm"), "{method}: error.{key}");
+            assert!(stats["error"].get(key).is_some(), "the key is always there");
+        }
+        assert_eq!(stats["parameters"]["method"], method);
+        for key in ["scene", "width", "height", "seed", "r_thresh", "beta", "min_trials", "max_trials", "backend"] {
+            assert!(stats["parameters"].get(key).is_some(), "parameters.{key}");
+        }
+        assert!(stats["peak_rss_bytes"].as_u64().unwrap() > 0 || cfg!(not(target_os = "linux")));
+        assert!(stats["rays"]["hires"].as_u64().unwrap() >= 24 * 16 * 4, "a view ray for each trial");
+        assert!(stats["seconds"]["total"].as_f64().unwrap() > 0.0);
+    }
+}
+
+#[test]
+fn quiet_says_nothing_and_otherwise_the_error_is_stated() {
+    let bench = Bench::new();
+    let quiet = bench.render(&["-o", "a.exr", "--quiet"]);
+    assert_eq!((quiet.stdout.len(), stderr(&quiet).as_str()), (0, ""));
+    let loud = bench.render(&["-o", "a.exr"]);
+    assert!(loud.stdout.is_empty(), "standard output is for what was asked for");
+    let text = stderr(&loud);
+    for words in ["a.exr", "noise", "bias of the mean"] {
+        assert!(text.contains(words), "{words}: {text}");
+    }
+    assert!(!text.contains('\u{1b}') && !text.contains('\r'), "no progress bars where there is no terminal");
+}
+
+/// Starts a rendering that would take hours.
+fn start_endless(bench: &Bench, target: &str) -> std::process::Child {
+    let arguments = ["render", "room.gltf", "-o", target, "--width", "64", "--height", "48", "--spp", "10000000"];
+    bench.command(&arguments).stderr(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap()
+}
+
+fn interrupt(child: &std::process::Child) {
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+}
+
+#[test]
+fn ctrl_c_writes_what_is_there_and_says_so() {
+    let bench = Bench::new();
+    let child = start_endless(&bench, "a.exr");
+    std::thread::sleep(Duration::from_secs(8));
+    interrupt(&child);
+    let output = child.wait_with_output().unwrap();
+    assert!(output.status.success(), "{}", stderr(&output));
+    assert!(stderr(&output).contains("stopped early"), "{}", stderr(&output));
+    let read = image::read(&bench.path("a.exr")).unwrap();
+    assert!(read.channel("trials.hires").unwrap().iter().any(|&t| t > 0.0));
+    assert_eq!(bench.files(), ["a.exr", "room.gltf"], "nothing half-written stays");
+}
+
+#[test]
+fn ctrl_c_before_the_first_trial_writes_nothing() {
+    let bench = Bench::new();
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/office-high.glb");
+    let arguments = ["render", path.to_str().unwrap(), "-o", "a.exr"];
+    let child = bench.command(&arguments).stderr(Stdio::piped()).spawn().unwrap();
+    std::thread::sleep(Duration::from_millis(300));
+    interrupt(&child);
+    let output = child.wait_with_output().unwrap();
+    let before_handler = output.status.code().is_none();
+    assert!(before_handler || output.status.code() == Some(1), "{:?}: {}", output.status, stderr(&output));
+    assert_eq!(bench.files(), ["room.gltf"]);
+}
+
+#[test]
+fn a_time_limit_is_kept() {
+    let bench = Bench::new();
+    let start = Instant::now();
+    let arguments = [
+        "render",
+        "room.gltf",
+        "-o",
+        "a.exr",
+        "--width",
+        "64",
+        "--height",
+        "48",
+        "--spp",
+        "10000000",
+        "--stats",
+        "a.json",
+    ];
+    let output = bench.gsii(&[&arguments[..], &["--time-limit", "1"]].concat());
+    assert!(output.status.success(), "{}", stderr(&output));
+    assert!(start.elapsed() < Duration::from_secs(60));
+    let stats: serde_json::Value = serde_json::from_slice(&std::fs::read(bench.path("a.json")).unwrap()).unwrap();
+    assert_eq!(stats["parameters"]["stopped_early"], true);
+    assert!(image::read(&bench.path("a.exr")).is_ok());
+}
+
+#[test]
+fn threads_and_runs_give_the_same_bytes_of_pixels() {
+    let bench = Bench::new();
+    let pixels = |name: &str, threads: &str| {
+        bench.render(&["-o", name, "--threads", threads]);
+        let read = image::read(&bench.path(name)).unwrap();
+        let values: Vec<(String, Vec<u32>)> =
+            read.channels().iter().map(|c| (c.name.clone(), c.values.iter().map(|v| v.to_bits()).collect())).collect();
+        values
+    };
+    let one = pixels("1.exr", "1");
+    assert_eq!(one, pixels("2.exr", "2"));
+    assert_eq!(one, pixels("again.exr", "1"));
+}
+
+#[test]
+fn compare_prints_the_metrics() {
+    let bench = Bench::new();
+    bench.render(&["-o", "a.exr"]);
+    bench.render(&["-o", "b.exr", "--seed", "1"]);
+    let output = bench.gsii(&["compare", "a.exr", "b.exr", "--json"]);
+    let metrics: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(metrics["metrics"]["rel_mse"].as_f64().unwrap() > 0.0);
+    let same = bench.gsii(&["compare", "a.exr", "a.exr", "--json"]);
+    let metrics: serde_json::Value = serde_json::from_slice(&same.stdout).unwrap();
+    assert_eq!(metrics["metrics"]["rel_mse"], 0.0);
+    refused(&bench.gsii(&["compare", "a.exr", "missing.exr"]), &["missing.exr"]);
+    refused(&bench.gsii(&["compare", "a.exr", "room.gltf"]), &["room.gltf"]);
+}
+
+#[test]
+fn info_tells_what_would_be_done() {
+    let bench = Bench::new();
+    let output = bench.gsii(&["info", "room.gltf"]);
+    let text = String::from_utf8(output.stdout.clone()).unwrap();
+    assert!(output.status.success(), "{}", stderr(&output));
+    for words in ["camera 0", "r_thresh", "surfaces", "clusters", "patches"] {
+        assert!(text.contains(words), "{words}: {text}");
+    }
+    // 75 blocks, the room and the lamp, twelve triangles each.
+    assert!(text.contains("924 in 77 objects"), "{text}");
+}
+
+#[test]
+fn validate_finds_no_unexplained_difference() {
+    let bench = Bench::new();
+    let output = bench.gsii(&["validate", "room.gltf", "--rays", "100000"]);
+    let text = String::from_utf8(output.stdout.clone()).unwrap();
+    assert!(output.status.success(), "{text}{}", stderr(&output));
+    let total = text.lines().find(|l| l.starts_with("total")).unwrap();
+    let numbers: Vec<u64> = total.split_whitespace().skip(1).map(|n| n.parse().unwrap()).collect();
+    assert_eq!((numbers[0], numbers[5]), (500_000, 0), "{text}");
+    assert_eq!(numbers[1..].iter().sum::<u64>(), numbers[0]);
+    assert!(numbers[1] > 100_000, "most rays hit something: {text}");
+    refused(&bench.gsii(&["validate", "room.gltf", "--rays", "0"]), &["--rays"]);
+    refused(&bench.gsii(&["validate", "room.gltf", "--r-thresh", "inf"]), &["--r-thresh"]);
+}
