@@ -205,6 +205,7 @@ impl Settings {
             beta: self.beta,
             box_fit: self.box_fit,
             crease_angle: self.crease_angle,
+            longest: self.longest_cluster,
             face_resolution: self.face_resolution,
             seed: self.seed,
         }

@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 
 use rayon::prelude::*;
 
+use super::cluster::Extent;
 use super::{SimplifyParams, Surface};
 use crate::backend::PartKind;
 use crate::error::{Error, Result};
@@ -39,6 +40,9 @@ pub fn check(params: &SimplifyParams) -> Result<f64> {
     if !(0.0..=std::f32::consts::PI).contains(&params.crease_angle) {
         return refuse("crease angle", params.crease_angle, "must lie between 0 and pi radians");
     }
+    if params.longest.is_nan() || params.longest < 1.0 {
+        return refuse("longest cluster", params.longest, "must be 1 or more, in units of r_thresh");
+    }
     if params.face_resolution == 0 {
         return Err(Error::Usage("face resolution = 0: a box face needs at least one patch".into()));
     }
@@ -52,42 +56,49 @@ pub fn check(params: &SimplifyParams) -> Result<f64> {
     Ok(a_thresh)
 }
 
-/// The largest diagonal of a surface or cluster that may be simplified: a point inside a cluster wider than `r_thresh` would
-/// see nothing between `r_thresh` and the wall of its box.
+/// The largest diagonal of a cluster that is harmless as such. A point inside a cluster sees nothing of it between `r_thresh`
+/// and the wall of its box; in one no wider than `r_thresh` there is nothing to be seen there.
 pub fn size_limit(scene: &Scene, r_thresh: f32) -> f32 {
     r_thresh.min(ENCLOSING_SHARE * scene.mesh.bounds.diagonal())
+}
+
+/// How large clusters may become: `longest` is in units of `r_thresh`.
+pub fn extent(scene: &Scene, r_thresh: f32, longest: f32) -> Extent {
+    let compact = size_limit(scene, r_thresh);
+    Extent { compact, longest: size_limit(scene, r_thresh * longest.max(1.0)) }
 }
 
 /// Small surfaces by what can be done with them.
 #[derive(Debug, Default)]
 pub struct Small {
-    /// Small in area and in extent: may be clustered or dropped.
-    pub compact: Vec<u32>,
-    /// Small in area, too long for a cluster, nothing near them: may be dropped.
+    /// Small in area, and in extent or beside others: may be clustered.
+    pub clusterable: Vec<u32>,
+    /// Small in area, not in extent, nothing near them: may be dropped.
     pub long_isolated: Vec<u32>,
-    /// Small in area, too long for a cluster, not alone: stay normal.
-    pub long_kept: usize,
 }
 
 /// Finds the small surfaces: area strictly below `a_thresh`, and no light source, mirror or glass.
-pub fn find_small(scene: &Scene, surfaces: &[Surface], a_thresh: f64, limit: f32) -> Small {
-    let mut small = Small::default();
-    let mut long = Vec::new();
-    for (i, surface) in (0u32..).zip(surfaces) {
-        let object = &scene.mesh.objects[surface.object as usize];
-        let material = &scene.materials[object.material as usize];
-        if surface.area < a_thresh && object.kind != PartKind::Pane && can_be_simplified(material) {
-            if surface.bounds.diagonal() <= limit { &mut small.compact } else { &mut long }.push(i);
-        }
-    }
+pub fn find_small(scene: &Scene, surfaces: &[Surface], a_thresh: f64, extent: Extent) -> Small {
+    let small = (0u32..).zip(surfaces).filter(|(_, s)| is_small(scene, s, a_thresh)).map(|(i, _)| i);
+    let of = |s: u32| &surfaces[s as usize];
+    let (mut clusterable, long): (Vec<u32>, Vec<u32>) =
+        small.partition(|&i| of(i).bounds.diagonal() <= extent.compact);
     // Anything that touches another surface may be part of an enclosure (GSII-025: the walls of a room whose area is below
     // A_thresh), and without it light would leak.
-    let gap = neighbour_gap(limit);
+    let gap = neighbour_gap(extent.compact);
     let neighbours = BoundsAlongX::new(surfaces);
-    let alone = |&i: &u32| !neighbours.any_overlap(surfaces, &surfaces[i as usize].bounds.expanded(gap), i);
-    small.long_isolated = long.par_iter().copied().filter(alone).collect();
-    small.long_kept = long.len() - small.long_isolated.len();
-    small
+    let alone = |&i: &u32| !neighbours.any_overlap(surfaces, &of(i).bounds.expanded(gap), i);
+    let (long_isolated, beside): (Vec<u32>, Vec<u32>) = long.par_iter().copied().partition(alone);
+    clusterable.extend(beside.into_iter().filter(|&i| of(i).bounds.diagonal() <= extent.longest));
+    clusterable.sort_unstable();
+    Small { clusterable, long_isolated }
+}
+
+/// Whether a surface is small enough to be simplified and not of a kind that never is.
+pub fn is_small(scene: &Scene, surface: &Surface, a_thresh: f64) -> bool {
+    let object = &scene.mesh.objects[surface.object as usize];
+    let material = &scene.materials[object.material as usize];
+    surface.area < a_thresh && object.kind != PartKind::Pane && can_be_simplified(material)
 }
 
 /// Surfaces sorted by where their bounds begin along x.

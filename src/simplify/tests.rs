@@ -51,8 +51,9 @@ fn gsii_001_threshold_is_strict_and_counts_surfaces() {
     // Strictly smaller: at r_thresh = 2, beta = 1/8 the threshold is exactly pi.
     let mut surfaces = s.surfaces.clone();
     surfaces[0].area = area_threshold(2.0, 0.125);
-    let small = classify::find_small(&isolated_quads(&[1.0; 4]), &surfaces, surfaces[0].area, 100.0);
-    assert!(!small.compact.contains(&0) && small.compact.contains(&1));
+    let extent = cluster::Extent { compact: 100.0, longest: 100.0 };
+    let small = classify::find_small(&isolated_quads(&[1.0; 4]), &surfaces, surfaces[0].area, extent);
+    assert!(!small.clusterable.contains(&0) && small.clusterable.contains(&1));
 }
 
 #[test]
