@@ -20,6 +20,8 @@ use glam::{Mat3, Vec3};
 pub use geometry::{SimplifiedGeometry, TriangleSource};
 use replace::{Replaced, Replacer};
 
+use dropped::Candidate;
+
 use crate::backend::{HitFilter, PartKind, RayBackend};
 use crate::error::Result;
 use crate::progress::Progress;
@@ -198,7 +200,8 @@ pub fn simplify(
         let extent = classify::extent(scene, params.r_thresh, params.longest);
         let small = classify::find_small(scene, &surfaces, a_thresh, extent);
         let mut groups = cluster::find_clusters(&scene.mesh, &map, &small.clusterable, extent);
-        drop_isolated(&mut surfaces, &mut groups, &small.long_isolated, a_thresh, params.r_thresh, extent);
+        let mut dropper = dropped::Dropper::new(a_thresh, params.r_thresh);
+        drop_isolated(&mut dropper, &mut surfaces, &mut groups, &small.long_isolated, extent);
         // Nothing that may become part of a box can carry one.
         let mut carriers = surfaces.clone();
         for s in groups.iter().flat_map(cluster::Group::surfaces) {
@@ -218,12 +221,7 @@ pub fn simplify(
                 surfaces[s as usize].class = Class::Complex { cluster: Some(cluster) };
             }
         }
-        let too_long = |s: &&Surface| {
-            s.class == Class::Normal
-                && s.bounds.diagonal() > extent.compact
-                && classify::is_small(scene, s, a_thresh)
-        };
-        let too_long = surfaces.iter().filter(too_long).count();
+        let too_long = drop_strips(&mut dropper, scene, &mut surfaces, &map.of_triangle, extent);
         if too_long > 0 {
             warnings.push(format!(
                 "{too_long} surfaces have less area than A_thresh = {a_thresh:.3e} but are longer than {:.3e} and stay normal",
@@ -253,39 +251,70 @@ fn is_used(scene: &Scene, r_thresh: f32) -> bool {
     r_thresh > 0.0 && r_thresh <= 2.0 * scene.mesh.bounds.diagonal()
 }
 
-/// Takes the groups that are dropped out of `groups` and marks their surfaces. Only compact groups and isolated surfaces are
-/// dropped: what is long and touches something else may be part of an enclosure.
+/// What became of surfaces that are dropped.
+const GONE: Class = Class::Complex { cluster: None };
+
+/// Takes the groups that are dropped out of `groups` and marks their surfaces. Long groups touch something else and may be
+/// part of an enclosure: they stay.
 fn drop_isolated(
+    dropper: &mut dropped::Dropper,
     surfaces: &mut [Surface],
     groups: &mut Vec<cluster::Group>,
     long_isolated: &[u32],
-    a_thresh: f64,
-    r_thresh: f32,
     extent: cluster::Extent,
 ) {
-    let of_group = |g: &cluster::Group| dropped::Candidate {
-        centre: g.bounds.centre(),
-        area: if g.bounds.diagonal() <= extent.compact { g.visible_area() } else { f64::INFINITY },
+    let of_group = |g: &cluster::Group| {
+        let compact = g.bounds.diagonal() <= extent.compact;
+        Candidate::compact(g.bounds.centre(), if compact { g.visible_area() } else { f64::INFINITY })
     };
     let of_surface = |&s: &u32| {
         let surface: &Surface = &surfaces[s as usize];
-        dropped::Candidate { centre: surface.bounds.centre(), area: surface.area }
+        Candidate::compact(surface.bounds.centre(), surface.area)
     };
     let candidates: Vec<_> = groups.iter().map(of_group).chain(long_isolated.iter().map(of_surface)).collect();
-    let is_dropped = dropped::choose_dropped(&candidates, a_thresh, r_thresh);
+    let is_dropped = dropper.choose(&candidates);
     let (of_groups, of_long) = is_dropped.split_at(groups.len());
-    let gone = Class::Complex { cluster: None };
     for (&s, _) in long_isolated.iter().zip(of_long).filter(|(_, dropped)| **dropped) {
-        surfaces[s as usize].class = gone;
+        surfaces[s as usize].class = GONE;
     }
     let mut of_groups = of_groups.iter();
     groups.retain(|group| {
         let dropped = of_groups.next().copied().unwrap_or(false);
         if dropped {
-            group.surfaces().into_iter().for_each(|s| surfaces[s as usize].class = gone);
+            group.surfaces().into_iter().for_each(|s| surfaces[s as usize].class = GONE);
         }
         !dropped
     });
+}
+
+/// Drops strips that no box replaces, as far as there is room left for them. Returns how many surfaces have little area and
+/// stay normal because they are too long.
+fn drop_strips(
+    dropper: &mut dropped::Dropper,
+    scene: &Scene,
+    surfaces: &mut [Surface],
+    surface_of_triangle: &[u32],
+    extent: cluster::Extent,
+) -> usize {
+    let (a_thresh, r_thresh) = (dropper.a_thresh, dropper.r_thresh);
+    let is_left = |s: &Surface| {
+        s.class == Class::Normal
+            && s.bounds.diagonal() > extent.compact
+            && classify::is_small(scene, s, a_thresh)
+    };
+    let is_strip = |s: &Surface| is_left(s) && dropped::is_strip(s.area, s.bounds.diagonal(), r_thresh);
+    let strips: Vec<u32> = (0u32..).zip(surfaces.iter()).filter(|(_, s)| is_strip(s)).map(|(i, _)| i).collect();
+    let mut triangles = vec![Vec::new(); strips.len()];
+    for (t, s) in (0u32..).zip(surface_of_triangle) {
+        if let Ok(i) = strips.binary_search(s) {
+            triangles[i].push(t);
+        }
+    }
+    let candidates: Vec<_> = triangles.iter().map(|t| Candidate::strip(&scene.mesh, t, r_thresh)).collect();
+    for (&s, _) in strips.iter().zip(dropper.choose(&candidates)).filter(|(_, dropped)| *dropped) {
+        surfaces[s as usize].class = GONE;
+    }
+    surfaces.iter().filter(|s| is_left(s)).count()
 }
 
 /// The scene's filter for alpha-tested triangles, where it has any.

@@ -31,7 +31,7 @@ const BAD_FIT: f32 = 0.05;
 
 /// A cluster longer than `r_thresh` is split when more than this share of the light leaving its surfaces meets it again
 /// beyond `r_thresh`: the simplified scene does not show that part from inside the box.
-const MOST_HIDDEN: f32 = 0.02;
+pub(super) const MOST_HIDDEN: f32 = 0.02;
 
 /// A cluster is split when the flux its box intercepts is off by more than this share, summed over the directions around the
 /// three axes.
