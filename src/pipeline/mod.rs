@@ -214,7 +214,8 @@ impl Settings {
     /// Parameters for [`radiosity::solve`].
     pub fn radiosity_params(&self) -> RadiosityParams {
         RadiosityParams {
-            patch_size: self.patch_size.unwrap_or(f32::INFINITY),
+            patch_size: self.patch_size.unwrap_or(f32::MAX),
+            max_rays: self.radiosity_rays,
             unshot: self.unshot,
             direct: self.direct,
             error: self.radiosity_error,

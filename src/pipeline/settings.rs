@@ -73,6 +73,8 @@ pub struct Settings {
     pub direct: DirectLight,
     /// Relative statistical error of the radiosity solution.
     pub radiosity_error: f32,
+    /// Most rays that first bounces of the radiosity solution are shot with, whatever its error then is.
+    pub radiosity_rays: u64,
     /// Roughness under which a specular lobe counts as highly directional.
     pub glossy_threshold: f32,
     /// Scattering events after which paths end.
@@ -99,7 +101,8 @@ impl Default for Settings {
             patch_size: None,
             unshot: 0.01,
             direct: DirectLight::Gather,
-            radiosity_error: 0.05,
+            radiosity_error: 0.15,
+            radiosity_rays: 1 << 22,
             glossy_threshold: 0.3,
             max_depth: u32::MAX,
             backend: BackendKind::Embree,

@@ -52,6 +52,8 @@ pub struct RadiosityParams {
     pub direct: DirectLight,
     /// Relative statistical error to aim for: decides how many rays are shot.
     pub error: f32,
+    /// Most rays that the light of the first bounce is shot with: where the error needs more, a warning says so.
+    pub max_rays: u64,
     /// Seed.
     pub seed: u32,
 }
@@ -66,6 +68,7 @@ impl RadiosityParams {
             ambient: true,
             direct: DirectLight::Gather,
             error: 0.02,
+            max_rays: 1 << 36,
             seed: 0,
         }
     }
@@ -112,9 +115,9 @@ pub struct RadiosityScene<'a> {
 }
 
 /// Rays of the first solution for each lit side: enough to estimate the error.
-const FIRST_RAYS: u64 = 64;
-/// Fewest and most rays that the light of the first bounce is shot with.
-const RAYS: (u64, u64) = (1 << 15, 1 << 24);
+const FIRST_RAYS: u64 = 16;
+/// Fewest rays that the light of the first bounce is shot with.
+const LEAST_RAYS: u64 = 1 << 15;
 /// Solutions that may be averaged to reach the error.
 const MAX_ROUNDS: u32 = 4;
 
@@ -180,7 +183,7 @@ impl Average {
         };
         // Direct light is gathered once; more shooting does not reduce its error.
         let of_direct = direct.as_ref().map_or(0.0, |d| d.error).min(0.9 * target);
-        let mut rays = (FIRST_RAYS * lit as u64).clamp(RAYS.0, RAYS.1);
+        let mut rays = (FIRST_RAYS * lit as u64).max(LEAST_RAYS);
         let mut total = 0;
         for round in 0..MAX_ROUNDS {
             self.add_pair(tracer, params, direct.as_ref(), rays, round, progress)?;
@@ -194,7 +197,10 @@ impl Average {
             // Low-discrepancy rays converge faster than the square root: measured slopes are near -0.63. A tenth more, as the
             // estimate is itself uncertain.
             let needed = 1.1 * excess.powf(0.8) * total as f64;
-            rays = ((needed - total as f64).max(0.25 * total as f64) as u64).min(RAYS.1);
+            rays = ((needed - total as f64).max(0.25 * total as f64) as u64).min(params.max_rays.saturating_sub(total));
+            if rays == 0 {
+                break;
+            }
         }
         let error = self.error(tracer.optics);
         if error > 1.25 * target {
