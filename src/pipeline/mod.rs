@@ -12,15 +12,14 @@ pub use stats::Stats;
 
 use crate::backend::embree::EmbreeBackend;
 use crate::backend::obvhs::ObvhsBackend;
-use crate::backend::{HitFilter, PartKind, RayBackend, RayScene, TriangleSet};
+use crate::backend::{PartKind, RayBackend, RayScene, TriangleSet};
 use crate::error::{Error, Result};
 use crate::lighting::Lights;
 use crate::progress::Progress;
 use crate::radiosity::{self, RadiosityParams, RadiosityScene, Solution};
 use crate::render::{FarField, Nearness, World};
-use crate::scene::alpha::AlphaFilter;
 use crate::scene::{Camera, Scene};
-use crate::simplify::{self, Simplified, SimplifiedGeometry, SimplifyParams, TriangleSource};
+use crate::simplify::{self, Simplified, SimplifiedGeometry, SimplifyParams};
 
 /// A scene, prepared for one method: acceleration structures, simplified scene, radiosity solution.
 pub struct Prepared {
@@ -64,15 +63,8 @@ impl Prepared {
     ) -> Result<Prepared> {
         settings.check()?;
         let backend = settings.backend.create(settings.threads)?;
-        let filter: Arc<dyn HitFilter> = Arc::new(AlphaFilter::new(Arc::clone(&scene)));
         let start = Instant::now();
-        let parts = scene.mesh.parts();
-        let detailed = backend.build(&TriangleSet {
-            positions: &scene.mesh.positions,
-            triangles: &scene.mesh.triangles,
-            parts: &parts,
-            filter: Some(Arc::clone(&filter)),
-        })?;
+        let detailed = build_detailed(&scene, backend.as_ref())?;
         let lights = Lights::new(&scene);
         stats.seconds.build += start.elapsed().as_secs_f64();
         stats.backend = backend.name();
@@ -82,7 +74,7 @@ impl Prepared {
         let far = match settings.method {
             Method::Mcpt => None,
             Method::Gsii if settings.r_thresh() == f32::INFINITY => None,
-            _ => Some(Far::new(&scene, &lights, backend.as_ref(), &filter, &settings, progress, stats)?),
+            _ => Some(Far::new(&scene, &lights, backend.as_ref(), &settings, progress, stats)?),
         };
         stats.parameters = settings.parameters();
         Ok(Prepared { scene, lights, detailed, far, settings })
@@ -113,7 +105,6 @@ impl Far {
         scene: &Arc<Scene>,
         lights: &Lights,
         backend: &dyn RayBackend,
-        filter: &Arc<dyn HitFilter>,
         settings: &Settings,
         progress: &Progress,
         stats: &mut Stats,
@@ -130,9 +121,7 @@ impl Far {
         stats.seconds.simplify += start.elapsed().as_secs_f64();
 
         let start = Instant::now();
-        let sources = geometry.sources.clone();
-        let filter = SimplifiedFilter { sources, scene_filter: Arc::clone(filter) };
-        let rays = backend.build(&TriangleSet { filter: Some(Arc::new(filter)), ..geometry.triangle_set() })?;
+        let rays = geometry.build(scene, backend)?;
         let nearness = (!complete).then(|| {
             let reach = 1.5 * settings.r_thresh();
             let clusters = simplified.clusters.iter().map(|c| c.bounds.union(c.equivalent_box.bounds()));
@@ -151,19 +140,35 @@ impl Far {
     }
 }
 
-/// Puts alpha tests of the simplified geometry to the scene's own filter.
-struct SimplifiedFilter {
-    sources: Vec<TriangleSource>,
-    scene_filter: Arc<dyn HitFilter>,
+/// Simplifies a scene and does nothing else; gives the settings with every automatic choice filled in.
+///
+/// # Errors
+/// Usage errors in the settings, backend failures.
+pub fn simplify_only(
+    scene: &Arc<Scene>,
+    camera: &Camera,
+    mut settings: Settings,
+    progress: &Progress,
+    stats: &mut Stats,
+) -> Result<(Simplified, Settings)> {
+    settings.check()?;
+    let backend = settings.backend.create(settings.threads)?;
+    if settings.r_thresh.is_none() || settings.patch_size.is_none() {
+        let detailed = build_detailed(scene, backend.as_ref())?;
+        auto::fill_in(&mut settings, scene, detailed.as_ref(), camera);
+    }
+    let simplified = simplify::simplify(scene, backend.as_ref(), &settings.simplify_params(), progress)?;
+    stats.record_simplified(&simplified);
+    Ok((simplified, settings))
 }
 
-impl HitFilter for SimplifiedFilter {
-    fn accepts(&self, triangle: u32, u: f32, v: f32) -> bool {
-        match self.sources[triangle as usize] {
-            TriangleSource::Scene { triangle } => self.scene_filter.accepts(triangle, u, v),
-            TriangleSource::BoxFace { .. } => true,
-        }
-    }
+fn build_detailed(scene: &Arc<Scene>, backend: &dyn RayBackend) -> Result<Box<dyn RayScene>> {
+    backend.build(&TriangleSet {
+        positions: &scene.mesh.positions,
+        triangles: &scene.mesh.triangles,
+        parts: &scene.mesh.parts(),
+        filter: simplify::scene_filter(scene),
+    })
 }
 
 impl BackendKind {

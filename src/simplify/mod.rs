@@ -3,9 +3,11 @@
 pub mod classify;
 pub mod cluster;
 pub mod dropped;
+pub mod export;
 pub mod fit;
 pub mod geometry;
 mod replace;
+pub mod report;
 mod support;
 pub mod surfaces;
 #[cfg(test)]
@@ -318,7 +320,7 @@ fn drop_strips(
 }
 
 /// The scene's filter for alpha-tested triangles, where it has any.
-fn scene_filter(scene: &Arc<Scene>) -> Option<Arc<dyn HitFilter>> {
+pub(crate) fn scene_filter(scene: &Arc<Scene>) -> Option<Arc<dyn HitFilter>> {
     let any = scene.mesh.objects.iter().any(|o| o.kind == PartKind::Filtered);
     any.then(|| Arc::new(AlphaFilter::new(scene.clone())) as Arc<dyn HitFilter>)
 }

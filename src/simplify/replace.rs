@@ -76,7 +76,7 @@ impl Replacer<'_> {
             return Ok(replaced);
         }
         let carriers = match self.params.box_fit {
-            BoxFit::Flux => Some(self.backend.build(&self.normal.triangle_set())?),
+            BoxFit::Flux => Some(self.normal.build(self.scene, self.backend)?),
             BoxFit::Paper1993 => None,
         };
         let (mut vanished, mut split) = (0, 0);
