@@ -86,8 +86,8 @@ pub fn find_small(scene: &Scene, surfaces: &[Surface], a_thresh: f64, extent: Ex
     // Anything that touches another surface may be part of an enclosure (GSII-025: the walls of a room whose area is below
     // A_thresh), and without it light would leak.
     let gap = neighbour_gap(extent.compact);
-    let neighbours = BoundsAlongX::new(surfaces);
-    let alone = |&i: &u32| !neighbours.any_overlap(surfaces, &of(i).bounds.expanded(gap), i);
+    let neighbours = BoundsAlongX::new(surfaces.iter().map(|s| s.bounds).collect());
+    let alone = |&i: &u32| !neighbours.any_overlap_but(&of(i).bounds.expanded(gap), i);
     let (long_isolated, beside): (Vec<u32>, Vec<u32>) = long.par_iter().copied().partition(alone);
     clusterable.extend(beside.into_iter().filter(|&i| of(i).bounds.diagonal() <= extent.longest));
     clusterable.sort_unstable();
@@ -101,33 +101,45 @@ pub fn is_small(scene: &Scene, surface: &Surface, a_thresh: f64) -> bool {
     surface.area < a_thresh && object.kind != PartKind::Pane && can_be_simplified(material)
 }
 
-/// Surfaces sorted by where their bounds begin along x.
-struct BoundsAlongX {
+/// What no box may cover: triangles of light sources, whose light it would swallow, mirrors and glass.
+pub fn uncoverable(scene: &Scene) -> BoundsAlongX {
+    let triangles = scene.mesh.objects.iter().filter(|o| !can_be_simplified(&scene.materials[o.material as usize]));
+    let bounds = |t: u32| Aabb::of(scene.mesh.corners(t));
+    BoundsAlongX::new(triangles.flat_map(|o| o.triangles.clone()).map(bounds).collect())
+}
+
+/// Bounds sorted by where they begin along x.
+pub struct BoundsAlongX {
+    bounds: Vec<Aabb>,
     order: Vec<u32>,
     /// For each place in `order`, the farthest end of the bounds up to there.
     reach: Vec<f32>,
 }
 
 impl BoundsAlongX {
-    fn new(surfaces: &[Surface]) -> Self {
-        let bounds = |s: u32| surfaces[s as usize].bounds;
-        let mut order: Vec<u32> = (0..surfaces.len() as u32).collect();
-        order.sort_by(|&a, &b| bounds(a).min.x.total_cmp(&bounds(b).min.x));
+    fn new(bounds: Vec<Aabb>) -> Self {
+        let mut order: Vec<u32> = (0..bounds.len() as u32).collect();
+        order.sort_by(|&a, &b| bounds[a as usize].min.x.total_cmp(&bounds[b as usize].min.x));
         let mut farthest = f32::NEG_INFINITY;
-        let reach = order.iter().map(|&s| {
-            farthest = farthest.max(bounds(s).max.x);
+        let reach = order.iter().map(|&i| {
+            farthest = farthest.max(bounds[i as usize].max.x);
             farthest
         });
-        BoundsAlongX { reach: reach.collect(), order }
+        BoundsAlongX { reach: reach.collect(), order, bounds }
     }
 
-    /// Whether the bounds of any surface but `except` overlap `bounds`.
-    fn any_overlap(&self, surfaces: &[Surface], bounds: &Aabb, except: u32) -> bool {
-        let end = self.order.partition_point(|&s| surfaces[s as usize].bounds.min.x <= bounds.max.x);
+    /// Whether any of the bounds overlap `bounds`.
+    pub fn any_overlap(&self, bounds: &Aabb) -> bool {
+        self.any_overlap_but(bounds, u32::MAX)
+    }
+
+    /// Whether any of the bounds but number `except` overlap `bounds`.
+    fn any_overlap_but(&self, bounds: &Aabb, except: u32) -> bool {
+        let end = self.order.partition_point(|&i| self.bounds[i as usize].min.x <= bounds.max.x);
         let candidates = self.order[..end].iter().zip(&self.reach[..end]).rev();
         candidates
             .take_while(|&(_, &reach)| reach >= bounds.min.x)
-            .any(|(&s, _)| s != except && surfaces[s as usize].bounds.overlaps(bounds))
+            .any(|(&i, _)| i != except && self.bounds[i as usize].overlaps(bounds))
     }
 }
 

@@ -11,7 +11,7 @@ use std::collections::HashMap;
 
 use glam::{IVec3, Vec3};
 
-use crate::scene::Mesh;
+use crate::scene::{Aabb, Mesh};
 
 /// Largest mean width of a long surface that may be dropped, in units of `r_thresh`: an angle of 0.1 at the least distance.
 const STRIP_WIDTH: f64 = 0.1;
@@ -32,6 +32,18 @@ impl Candidate {
     /// Something no larger than about `r_thresh`.
     pub fn compact(centre: Vec3, area: f64) -> Self {
         Candidate { area, parts: vec![(centre, area)] }
+    }
+
+    /// Something that fills `bounds` evenly.
+    pub fn spread(bounds: Aabb, area: f64, r_thresh: f32) -> Self {
+        let cells = (bounds.size() / r_thresh).ceil().clamp(Vec3::ONE, Vec3::splat(MOST_CUTS as f32));
+        let [x, y, z] = cells.as_uvec3().to_array();
+        let share = area / f64::from(x * y * z);
+        let part = |i: u32| {
+            let cell = Vec3::new((i % x) as f32, (i / x % y) as f32, (i / x / y) as f32) + 0.5;
+            (bounds.min + cell / cells * bounds.size(), share)
+        };
+        Candidate { area, parts: (0..x * y * z).map(part).collect() }
     }
 
     /// Something long.

@@ -214,10 +214,12 @@ pub fn simplify(
             backend,
             params,
             compact: extent.compact,
+            uncoverable: classify::uncoverable(scene),
             surface_of_triangle: &map.of_triangle,
             normal: &SimplifiedGeometry::normal(scene, &carriers, &map.of_triangle),
         }
         .replace(groups, progress)?;
+        drop_small_boxes(&mut dropper, &mut surfaces, &mut replaced.clusters, extent);
         for (cluster, c) in (0u32..).zip(&replaced.clusters) {
             for &s in &c.surfaces {
                 surfaces[s as usize].class = Class::Complex { cluster: Some(cluster) };
@@ -284,6 +286,31 @@ fn drop_isolated(
         let dropped = of_groups.next().copied().unwrap_or(false);
         if dropped {
             group.surfaces().into_iter().for_each(|s| surfaces[s as usize].class = GONE);
+        }
+        !dropped
+    });
+}
+
+/// Drops long clusters that come out so sparse that their boxes are below the threshold, as the paper does. Compact ones have
+/// been decided on before they were fitted.
+fn drop_small_boxes(
+    dropper: &mut dropped::Dropper,
+    surfaces: &mut [Surface],
+    clusters: &mut Vec<Cluster>,
+    extent: cluster::Extent,
+) {
+    let r_thresh = dropper.r_thresh;
+    let candidates = clusters.iter().map(|c| {
+        let long = c.bounds.diagonal() > extent.compact;
+        // No direction shows more of a box than three of its faces.
+        let area = fit::half_surface(2.0 * c.equivalent_box.half);
+        Candidate::spread(c.equivalent_box.bounds(), if long { area } else { f64::INFINITY }, r_thresh)
+    });
+    let mut is_dropped = dropper.choose(&candidates.collect::<Vec<_>>()).into_iter();
+    clusters.retain(|c| {
+        let dropped = is_dropped.next().unwrap_or(false);
+        if dropped {
+            c.surfaces.iter().for_each(|&s| surfaces[s as usize].class = GONE);
         }
         !dropped
     });

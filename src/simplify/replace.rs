@@ -11,7 +11,7 @@ use super::fit::lines::Buffers;
 use super::fit::paper1993::RAYS_ALONG_PATCH;
 use super::fit::{FluxFit, Frame, PaperFit, Probe, Stage, fill_patches, frame_along};
 use super::geometry::SimplifiedGeometry;
-use super::{BoxFit, Cluster, EquivalentBox, FitResidual, SimplifyParams, geometry, support};
+use super::{BoxFit, classify, Cluster, EquivalentBox, FitResidual, SimplifyParams, geometry, support};
 use crate::backend::{RayBackend, RayScene};
 use crate::error::Result;
 use crate::progress::Progress;
@@ -63,6 +63,8 @@ pub(super) struct Replacer<'a> {
     /// Groups up to this diagonal need not hide their far parts.
     pub(super) compact: f32,
     pub(super) surface_of_triangle: &'a [u32],
+    /// What no box may cover.
+    pub(super) uncoverable: classify::BoundsAlongX,
     /// What may carry clusters.
     pub(super) normal: &'a SimplifiedGeometry,
 }
@@ -87,10 +89,11 @@ impl Replacer<'_> {
                 replaced.rays += fitted.rays;
                 let compact = group.bounds.diagonal() <= self.compact;
                 let hides = !compact && fitted.residual.hidden > MOST_HIDDEN;
-                if round < MOST_SPLITS && group.has_parts() && (hides || fitted.misfits()) {
+                let impossible = hides || self.uncoverable.any_overlap(&fitted.equivalent_box.bounds());
+                if round < MOST_SPLITS && group.has_parts() && (impossible || fitted.misfits()) {
                     split += 1;
                     parts.extend(group.split().into_iter().filter(worth_a_box));
-                } else if !hides {
+                } else if !impossible {
                     vanished += usize::from(fitted.vanished);
                     replaced.clusters.push(fitted.cluster(&group));
                 }
