@@ -38,7 +38,10 @@ fn main() -> Outcome<()> {
             _ => scenes.push(arg),
         }
     }
-    println!("{:<18} {:>7} {:>6} {:>8}  {:<9} {:>10} {:>10}", "scene", "r_thresh", "boxes", "surfaces", "clusters", "mean |d|", "mean d");
+    println!(
+        "{:<18} {:>7} {:>6} {:>8}  {:<9} {:>10} {:>10}",
+        "scene", "r_thresh", "boxes", "surfaces", "clusters", "mean |d|", "mean d"
+    );
     for scene in scenes {
         if let Err(error) = measure(Path::new(&scene), settings.clone(), points, rays) {
             println!("{scene}: {error}");
@@ -102,7 +105,8 @@ fn measure(path: &Path, mut settings: Settings, points: u32, rays_a_point: u32) 
     for (name, box_fit) in [("flux", BoxFit::Flux), ("paper1993", BoxFit::Paper1993), ("none", BoxFit::Flux)] {
         settings.box_fit = box_fit;
         let s = simplify(&scene, backend.as_ref(), &settings.simplify_params(), &Progress::silent())?;
-        let lit = |geometry, clusters: &[Cluster]| Lit::new(&scene, &lights, backend.as_ref(), geometry, clusters, &settings);
+        let lit =
+            |geometry, clusters: &[Cluster]| Lit::new(&scene, &lights, backend.as_ref(), geometry, clusters, &settings);
         if reference.is_none() {
             reference = Some(lit(everything(&s.surface_of_triangle), &[])?.gather(&far, rays_a_point as usize));
         }

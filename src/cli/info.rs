@@ -95,7 +95,10 @@ fn print_plan(prepared: &Prepared, stats: &Stats) {
         println!("  simplified  {} surfaces, {} triangles", count.normal + count.simple, far.geometry.triangles.len());
     }
     println!("  patches     {} of size {:.4}", stats.counts.patches, settings.patch_size.unwrap_or(0.0));
-    println!("  radiosity   error {:.4}, {} shots, {} rays", stats.error.radiosity, far.solution.shots, far.solution.rays);
+    println!(
+        "  radiosity   error {:.4}, {} shots, {} rays",
+        stats.error.radiosity, far.solution.shots, far.solution.rays
+    );
     let s = &stats.seconds;
     println!("  seconds     simplify {:.2}, build {:.2}, radiosity {:.2}", s.simplify, s.build, s.radiosity);
 }

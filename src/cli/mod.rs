@@ -15,7 +15,12 @@ use crate::error::Error;
 
 /// Physically accurate images of cluttered scenes on a CPU, fast, with a stated error.
 #[derive(Debug, Parser)]
-#[command(name = "gsii", version, about, after_help = "Exit codes: 0 done, 1 failed while running, 2 bad usage or bad input.")]
+#[command(
+    name = "gsii",
+    version,
+    about,
+    after_help = "Exit codes: 0 done, 1 failed while running, 2 bad usage or bad input."
+)]
 struct Arguments {
     #[command(subcommand)]
     command: Command,

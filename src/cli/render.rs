@@ -67,7 +67,7 @@ pub struct Options {
     #[command(flatten)]
     method: MethodOptions,
     /// Layers to write beside R,G,B where the format has named channels: hires, lores, hires_dev, lores_dev, albedo, normal,
-    /// depth, trials [default: all]
+    /// depth, trials, class, cluster, lookup_distance, near_share [default: all]
     #[arg(long, value_name = "NAME,...", value_delimiter = ',', help_heading = "Output")]
     layers: Option<Vec<Layer>>,
     /// Stops by which formats for screens are brightened [default: automatic]
@@ -251,7 +251,8 @@ impl Options {
             s.hires,
             s.lores
         ));
-        let mut errors = format!("noise {:.2} % (HIRES {:.2}, LORES {:.2})", 100.0 * e.total, 100.0 * e.hires, 100.0 * e.lores);
+        let mut errors =
+            format!("noise {:.2} % (HIRES {:.2}, LORES {:.2})", 100.0 * e.total, 100.0 * e.hires, 100.0 * e.lores);
         if let (Some(bias), Some(ci)) = (e.bias, e.bias_ci) {
             errors += &format!(", bias of the mean {:+.2} +- {:.2} %", 100.0 * bias, 100.0 * ci);
         }

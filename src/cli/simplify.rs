@@ -170,7 +170,8 @@ fn print_table(
     );
     if !clusters.is_empty() {
         let n = clusters.len() as f32;
-        let mean = |f: &dyn Fn(&crate::simplify::FitResidual) -> f32| clusters.iter().map(|c| f(&c.residual)).sum::<f32>() / n;
+        let mean =
+            |f: &dyn Fn(&crate::simplify::FitResidual) -> f32| clusters.iter().map(|c| f(&c.residual)).sum::<f32>() / n;
         println!(
             "boxes on fresh rays: mean |intercepted - 1| {:.4}, by direction {:.4}, mean |reflected colour| {:.4}, hidden {:.4}",
             mean(&|r| r.intercepted.abs()),

@@ -87,6 +87,7 @@ impl Prepared {
             lights: &self.lights,
             detailed: self.detailed.as_ref(),
             has_panes: self.scene.mesh.objects.iter().any(|o| o.kind == PartKind::Pane),
+            simplified: self.far.as_ref().and_then(|far| far.simplified.as_ref()),
             far: self.far.as_ref().map(|far| FarField {
                 rays: far.rays.as_ref(),
                 geometry: &far.geometry,
@@ -195,8 +196,7 @@ pub fn choose_camera<'a>(scene: &'a Scene, wanted: Option<&str>) -> Result<&'a C
     let by_name = scene.cameras.iter().find(|c| c.name == wanted);
     let by_number = || wanted.parse::<usize>().ok().and_then(|i| scene.cameras.get(i));
     by_name.or_else(by_number).ok_or_else(|| {
-        let names: Vec<String> =
-            scene.cameras.iter().enumerate().map(|(i, c)| format!("{i} ({})", c.name)).collect();
+        let names: Vec<String> = scene.cameras.iter().enumerate().map(|(i, c)| format!("{i} ({})", c.name)).collect();
         Error::Usage(format!("{} has no camera '{wanted}'; it has {}", scene.name, names.join(", ")))
     })
 }

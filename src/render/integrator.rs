@@ -28,7 +28,7 @@ use crate::radiosity::Solution;
 use crate::sampling::{hash_all, sobol};
 use crate::scene::{Camera, Scene};
 use crate::shading::{Bsdf, SurfacePoint};
-use crate::simplify::{SimplifiedGeometry, TriangleSource};
+use crate::simplify::{Simplified, SimplifiedGeometry, TriangleSource};
 
 /// Distance that shadow rays stop short of the light, relative: covers the rounding of an intersection with the light's own
 /// triangle.
@@ -57,6 +57,8 @@ pub struct World<'a> {
     pub detailed: &'a dyn RayScene,
     /// Whether the detailed scene has surfaces that transmit without bending.
     pub has_panes: bool,
+    /// How the far field's scene came about, for layers that show it.
+    pub simplified: Option<&'a Simplified>,
     /// The far field; without one all light is path traced (MCPT).
     pub far: Option<FarField<'a>>,
     /// Roughness under which a specular lobe counts as highly directional.
@@ -312,6 +314,7 @@ impl<'a> World<'a> {
         for k in 0..ws.traced.len() {
             let (index, hit) = (ws.traced[k], ws.hits[k]);
             if hit.is_hit() {
+                ws.note_near(index);
                 self.shade(ws, index, &hit, None, passes, capture);
             } else if ws.paths[index as usize].near.is_finite() {
                 // The rest of the ray meets the simplified scene.
@@ -353,6 +356,8 @@ impl<'a> World<'a> {
     ) {
         let path = &ws.paths[index as usize];
         let TriangleSource::Scene { triangle } = far.geometry.sources[hit.triangle as usize] else {
+            ws.note_lookup(index, hit.t);
+            let path = &ws.paths[index as usize];
             let radiosity = far.solution.radiosity(hit.triangle, hit.u, hit.v, true);
             ws.lores[path.trial as usize] += path.throughput * radiosity * FRAC_1_PI;
             return;
@@ -362,6 +367,11 @@ impl<'a> World<'a> {
         let near = hit.t <= path.near
             || (far.r_thresh > 0.0 && far.solution.patch_diameter(hit.triangle, hit.u, hit.v) > hit.t);
         let look_up = (!near).then_some(hit.triangle);
+        if near {
+            ws.note_near(index);
+        } else {
+            ws.note_lookup(index, hit.t);
+        }
         self.shade(ws, index, &Hit { triangle, ..*hit }, look_up, passes, capture);
     }
 
@@ -394,7 +404,10 @@ impl<'a> World<'a> {
             && let Some(feature) = ws.features.get_mut(trial)
         {
             let normal = if front { point.shading_normal } else { -point.shading_normal };
-            *feature = Feature { albedo: low + high, normal, depth: hit.t, hits: 1 };
+            *feature = Feature { albedo: low + high, normal, depth: hit.t, hits: 1, ..Feature::default() };
+            if let Some(simplified) = self.simplified {
+                feature.classify(simplified, hit.triangle);
+            }
         }
         if path.depth >= self.max_depth {
             return;
@@ -518,6 +531,25 @@ impl Workspace {
     /// LORES sums of the last batch.
     pub(super) fn take_lores(&mut self) -> Vec<Vec3> {
         std::mem::take(&mut self.lores)
+    }
+
+    /// A gather ray ended in the detailed scene.
+    fn note_near(&mut self, path: u32) {
+        let path = &self.paths[path as usize];
+        if path.gathers
+            && let Some(feature) = self.features.get_mut(path.trial as usize)
+        {
+            feature.near += 1;
+        }
+    }
+
+    /// A gather ray of length `distance` looked a radiosity up.
+    fn note_lookup(&mut self, path: u32, distance: f32) {
+        let trial = self.paths[path as usize].trial;
+        if let Some(feature) = self.features.get_mut(trial as usize) {
+            feature.lookups += 1;
+            feature.lookup_distance += distance;
+        }
     }
 
     /// Forgets the last batch and makes room for the sums of `trials` trials.

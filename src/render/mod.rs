@@ -2,21 +2,21 @@
 
 pub mod bias;
 pub mod film;
-pub mod layers;
-pub mod show;
 pub mod integrator;
+pub mod layers;
 pub mod nearness;
 pub mod path;
 pub mod plan;
+pub mod show;
 
 use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 
 pub use film::Film;
+use integrator::{Batch, Workspace};
 pub use integrator::{FarField, PassTimes, RayCounts, World};
 pub use nearness::Nearness;
-use integrator::{Batch, Workspace};
 use path::Passes;
 use plan::Allocation;
 

@@ -81,8 +81,7 @@ pub struct Small {
 pub fn find_small(scene: &Scene, surfaces: &[Surface], a_thresh: f64, extent: Extent) -> Small {
     let small = (0u32..).zip(surfaces).filter(|(_, s)| is_small(scene, s, a_thresh)).map(|(i, _)| i);
     let of = |s: u32| &surfaces[s as usize];
-    let (mut clusterable, long): (Vec<u32>, Vec<u32>) =
-        small.partition(|&i| of(i).bounds.diagonal() <= extent.compact);
+    let (mut clusterable, long): (Vec<u32>, Vec<u32>) = small.partition(|&i| of(i).bounds.diagonal() <= extent.compact);
     // Anything that touches another surface may be part of an enclosure (GSII-025: the walls of a room whose area is below
     // A_thresh), and without it light would leak.
     let gap = neighbour_gap(extent.compact);

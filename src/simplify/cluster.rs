@@ -113,9 +113,17 @@ impl Group {
         }
     }
 
+    /// The two groups that it was merged from; empty where it was not.
+    pub fn parts(&self) -> &[Group] {
+        match &self.content {
+            Content::Pair(parts) => parts.as_slice(),
+            _ => &[],
+        }
+    }
+
     /// Whether it was merged from others.
     pub fn has_parts(&self) -> bool {
-        matches!(self.content, Content::Pair(_))
+        !self.parts().is_empty()
     }
 
     /// What it was merged from; itself where it was not.

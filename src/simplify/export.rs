@@ -139,8 +139,11 @@ fn empty_shapes(scene: &Scene, simplified: &Simplified) -> Vec<Shape> {
         let emission = scene.materials[o.material as usize].emission;
         Shape { name: o.name.clone(), emission, ..Shape::default() }
     });
-    let boxes = (0..simplified.clusters.len())
-        .map(|i| Shape { name: format!("cluster {i}"), is_box: true, ..Shape::default() });
+    let boxes = (0..simplified.clusters.len()).map(|i| Shape {
+        name: format!("cluster {i}"),
+        is_box: true,
+        ..Shape::default()
+    });
     objects.chain(boxes).collect()
 }
 

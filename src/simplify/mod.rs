@@ -327,9 +327,7 @@ fn drop_strips(
 ) -> usize {
     let (a_thresh, r_thresh) = (dropper.a_thresh, dropper.r_thresh);
     let is_left = |s: &Surface| {
-        s.class == Class::Normal
-            && s.bounds.diagonal() > extent.compact
-            && classify::is_small(scene, s, a_thresh)
+        s.class == Class::Normal && s.bounds.diagonal() > extent.compact && classify::is_small(scene, s, a_thresh)
     };
     let is_strip = |s: &Surface| is_left(s) && dropped::is_strip(s.area, s.bounds.diagonal(), r_thresh);
     let strips: Vec<u32> = (0u32..).zip(surfaces.iter()).filter(|(_, s)| is_strip(s)).map(|(i, _)| i).collect();

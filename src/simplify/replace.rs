@@ -11,7 +11,7 @@ use super::fit::lines::Buffers;
 use super::fit::paper1993::RAYS_ALONG_PATCH;
 use super::fit::{FluxFit, Frame, PaperFit, Probe, Stage, fill_patches, frame_along};
 use super::geometry::SimplifiedGeometry;
-use super::{BoxFit, classify, Cluster, EquivalentBox, FitResidual, SimplifyParams, geometry, support};
+use super::{BoxFit, Cluster, EquivalentBox, FitResidual, SimplifyParams, classify, geometry, support};
 use crate::backend::{RayBackend, RayScene};
 use crate::error::Result;
 use crate::progress::Progress;
@@ -33,8 +33,8 @@ const BAD_FIT: f32 = 0.05;
 /// beyond `r_thresh`: the simplified scene does not show that part from inside the box.
 pub(super) const MOST_HIDDEN: f32 = 0.02;
 
-/// A cluster is split when the flux its box intercepts is off by more than this share, summed over the directions around the
-/// three axes.
+/// A cluster is split when both of its parts are worth a box and the flux its box intercepts is off by more than this share, summed over the directions around the
+/// three axes. The paper's boxes are left as they come out.
 const MOST_DIRECTIONAL: f32 = 0.25;
 
 /// Times that clusters are split. More than about ten pairs deep nothing is longer than `r_thresh` any more.
@@ -81,6 +81,7 @@ impl Replacer<'_> {
             BoxFit::Flux => Some(self.normal.build(self.scene, self.backend)?),
             BoxFit::Paper1993 => None,
         };
+        let params = self.params;
         let (mut vanished, mut split) = (0, 0);
         for round in 0..=MOST_SPLITS {
             let fitted = self.fit_all(&candidates, carriers.as_deref(), progress)?;
@@ -90,7 +91,9 @@ impl Replacer<'_> {
                 let compact = group.bounds.diagonal() <= self.compact;
                 let hides = !compact && fitted.residual.hidden > MOST_HIDDEN;
                 let impossible = hides || self.uncoverable.any_overlap(&fitted.equivalent_box.bounds());
-                if round < MOST_SPLITS && group.has_parts() && (impossible || fitted.misfits()) {
+                let split_helps =
+                    || params.box_fit == BoxFit::Flux && fitted.misfits() && group.parts().iter().all(worth_a_box);
+                if round < MOST_SPLITS && group.has_parts() && (impossible || split_helps()) {
                     split += 1;
                     parts.extend(group.split().into_iter().filter(worth_a_box));
                 } else if !impossible {
@@ -109,12 +112,7 @@ impl Replacer<'_> {
         Ok(replaced)
     }
 
-    fn fit_all(
-        &self,
-        groups: &[Group],
-        carriers: Option<&dyn RayScene>,
-        progress: &Progress,
-    ) -> Result<Vec<Fitted>> {
+    fn fit_all(&self, groups: &[Group], carriers: Option<&dyn RayScene>, progress: &Progress) -> Result<Vec<Fitted>> {
         let Replacer { scene, params, .. } = *self;
         let triangles = self.triangles_of(groups);
         let frames: Vec<Frame> = triangles.par_iter().map(|t| choose_frame(scene, t, params)).collect();

@@ -76,7 +76,9 @@ impl Frame {
             }
         }
         let turned = Frame::around(corners(), best.1);
-        if turned.surface() < WORTHWHILE * upright.surface() && turned.half.length() <= upright.half.length().max(0.5 * limit) {
+        if turned.surface() < WORTHWHILE * upright.surface()
+            && turned.half.length() <= upright.half.length().max(0.5 * limit)
+        {
             turned
         } else {
             upright
