@@ -62,6 +62,9 @@ pub struct MethodOptions {
     /// How boxes are fitted to clusters
     #[arg(long = "box", value_enum, default_value_t, help_heading = "Method")]
     pub box_fit: BoxFit,
+    /// Roughness that indirect light sees opaque surfaces at least as rough as (0: as they are; mcpt always uses 0)
+    #[arg(long, value_name = "X", default_value_t = Settings::default().filter_glossy, help_heading = "Method")]
+    pub filter_glossy: f32,
     /// Scattering events after which paths end [default: unlimited]
     #[arg(long, value_name = "N", help_heading = "Method")]
     pub max_depth: Option<u32>,
@@ -120,6 +123,7 @@ impl MethodOptions {
             box_fit: self.box_fit,
             patch_size: self.patch_size.0,
             unshot: self.unshot,
+            filter_glossy: self.filter_glossy,
             max_depth: self.max_depth.unwrap_or(default.max_depth),
             backend: self.backend,
             threads: self.threads.unwrap_or(0),

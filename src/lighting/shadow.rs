@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use crate::backend::{Coherence, Hit, PartKind, Ray, RayScene, Visible};
 use crate::scene::Scene;
-use crate::shading::{Bsdf, SurfacePoint};
+use crate::shading::{Bsdf, Lobes, SurfacePoint};
 use crate::simplify::TriangleSource;
 
 /// Panes that a shadow ray passes before it is given up as blocked.
@@ -140,7 +140,7 @@ fn pass_panes(
             };
             let point = SurfacePoint::new(scene, &Hit { triangle, ..*hit });
             // The threshold only sorts reflections.
-            through[*i] *= Bsdf::new(scene, &point, -ray.direction, 0.0).straight_transmittance();
+            through[*i] *= Bsdf::new(scene, &point, -ray.direction, Lobes::MIRRORS).straight_transmittance();
             let origin = point.ray_origin(ray.direction);
             ray.t_far -= (origin - ray.origin).dot(ray.direction);
             ray.origin = origin;

@@ -19,7 +19,8 @@ use crate::progress::Progress;
 use crate::radiosity::{self, RadiosityParams, RadiosityScene, Solution};
 use crate::render::{FarField, Nearness, World};
 use crate::scene::{Camera, Scene};
-use crate::simplify::{self, Simplified, SimplifiedGeometry, SimplifyParams};
+use crate::shading::Lobes;
+use crate::simplify::{self, Simplified, SimplifiedGeometry, SimplifyParams, TriangleSource};
 
 /// A scene, prepared for one method: acceleration structures, simplified scene, radiosity solution.
 pub struct Prepared {
@@ -45,6 +46,8 @@ pub struct Far {
     pub rays: Box<dyn RayScene>,
     /// Radiosities.
     pub solution: Solution,
+    /// See [`FarField::plain`].
+    pub plain: Vec<bool>,
     /// Where near parts of gather rays need the detailed scene.
     pub nearness: Option<Nearness>,
 }
@@ -92,10 +95,15 @@ impl Prepared {
                 rays: far.rays.as_ref(),
                 geometry: &far.geometry,
                 solution: &far.solution,
+                plain: &far.plain,
                 r_thresh: if self.settings.method == Method::Gsii { self.settings.r_thresh() } else { 0.0 },
                 nearness: far.nearness.as_ref(),
             }),
-            glossy_threshold: self.settings.glossy_threshold,
+            gather_lobes: Lobes {
+                threshold: self.settings.glossy_threshold,
+                // Path tracing is the reference: nothing is blurred there.
+                least_roughness: if self.far.is_some() { self.settings.filter_glossy } else { 0.0 },
+            },
             max_depth: self.settings.max_depth,
         }
     }
@@ -137,7 +145,19 @@ impl Far {
         let solution = radiosity::solve(&input, &settings.radiosity_params(), progress)?;
         stats.seconds.radiosity += start.elapsed().as_secs_f64();
         stats.record_solution(&solution);
-        Ok(Far { simplified: (!complete).then_some(simplified), geometry, rays, solution, nearness })
+        let plain = geometry.sources.iter().map(|source| is_plain(scene, source)).collect();
+        Ok(Far { simplified: (!complete).then_some(simplified), geometry, rays, solution, plain, nearness })
+    }
+}
+
+/// Whether all that leaves a triangle of the far field's geometry is in the radiosity solution.
+fn is_plain(scene: &Scene, source: &TriangleSource) -> bool {
+    match *source {
+        TriangleSource::BoxFace { .. } => true,
+        TriangleSource::Scene { triangle } => {
+            let material = scene.material(triangle);
+            !material.is_emitter() && !material.may_be_sharp()
+        }
     }
 }
 

@@ -77,6 +77,9 @@ pub struct Settings {
     pub radiosity_rays: u64,
     /// Roughness under which a specular lobe counts as highly directional.
     pub glossy_threshold: f32,
+    /// Roughness that gather rays see opaque surfaces at least as rough as: bright small sources mirrored in them are then
+    /// found by next-event estimation instead of by luck. 0 for none; path tracing uses none.
+    pub filter_glossy: f32,
     /// Scattering events after which paths end.
     pub max_depth: u32,
     /// Ray-tracing library.
@@ -104,6 +107,7 @@ impl Default for Settings {
             radiosity_error: 0.15,
             radiosity_rays: 1 << 22,
             glossy_threshold: 0.3,
+            filter_glossy: 0.3,
             max_depth: u32::MAX,
             backend: BackendKind::Embree,
             threads: 0,
@@ -143,6 +147,7 @@ impl Settings {
                 refuse("--patch-size", "must be a length above 0")
             }
             s if !(s.unshot > 0.0 && s.unshot <= 1.0) => refuse("--unshot", "must be above 0 and at most 1"),
+            s if !(0.0..=1.0).contains(&s.filter_glossy) => refuse("--filter-glossy", "must be between 0 and 1"),
             s if s.face_resolution == 0 => refuse("face resolution", "must be at least 1"),
             _ => Ok(()),
         }
@@ -162,6 +167,7 @@ impl Settings {
             ("unshot", json!(self.unshot)),
             ("radiosity_error", json!(self.radiosity_error)),
             ("glossy_threshold", json!(self.glossy_threshold)),
+            ("filter_glossy", json!(self.filter_glossy)),
             ("max_depth", json!(self.max_depth)),
             ("backend", json!(self.backend)),
             ("seed", json!(self.seed)),

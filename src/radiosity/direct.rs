@@ -41,7 +41,7 @@ struct Estimate {
 /// bias the mean.
 pub(super) fn gather(input: &RadiosityScene<'_>, patches: &Patches, seed: u32, target: f64) -> Direct {
     let sides = 2 * patches.len();
-    let area = |side: usize| patches.area[side / 2];
+    let area = |side: usize| patches.open_area(side as u32);
     let stream = |what: u32| sampling::hash_all(&[seed, 0x00d1_9ec7, what]);
     let pilot = estimate(input, patches, &vec![PILOT; sides], stream(2));
     // Sum of standard errors is least for samples in proportion to (A sigma)^(2/3).
@@ -116,7 +116,7 @@ fn sample(
     let stream = sampling::hash_all(&[stream, side]);
     let s = sampling::sobol(index, 0, stream);
     let choice = sampling::sobol(index, 1, stream)[0];
-    let point = patches.point(input.geometry, side / 2, [s[0], s[1]]);
+    let point = patches.open_point(input.geometry, side, [s[0], s[1]]);
     let normal = side_normal(&point, side);
     let light = input.lights.sample(input.scene, point.position, normal, [choice, s[2], s[3]])?;
     let cos = light.direction.dot(normal);

@@ -26,7 +26,7 @@ pub(super) struct Emitted {
 
 /// Shoots all light: emitting patches as any patch, with exactly their flux, and lights without area. Uses about `rays` rays.
 pub(super) fn shoot_all(tracer: &Tracer<'_>, rays: u64, stream: u32) -> Emitted {
-    let area = |side: u32| tracer.patches.area[side as usize / 2];
+    let area = |side: u32| tracer.patches.open_area(side);
     let punctual = punctual(tracer.input.scene);
     let of_patches: DVec3 = tracer.optics.emission.iter().map(|&(side, exitance)| area(side) * exitance).sum();
     let of_lights = DVec3::from_array(punctual.flux());

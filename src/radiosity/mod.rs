@@ -138,7 +138,7 @@ pub fn count_patches(geometry: &SimplifiedGeometry, clusters: &[Cluster], params
 pub fn solve(input: &RadiosityScene<'_>, params: &RadiosityParams, progress: &Progress) -> Result<Solution> {
     params.check()?;
     let asked = f64::from(params.patch_size);
-    let patches = Patches::new(input.geometry, input.clusters, asked, params.max_patches)?;
+    let mut patches = Patches::new(input.geometry, input.clusters, asked, params.max_patches)?;
     let optics = Optics::new(input, &patches)?;
     let mut average = Average::new(2 * patches.len());
     if patches.size > asked {
@@ -148,6 +148,7 @@ pub fn solve(input: &RadiosityScene<'_>, params: &RadiosityParams, progress: &Pr
         ));
     }
     if !input.lights.is_empty() && patches.len() > 0 {
+        patches.leave_out_covered(input, params.seed);
         let tracer = Tracer { input, patches: &patches, optics: &optics };
         average.solve(&tracer, params, progress)?;
     }
@@ -283,7 +284,8 @@ impl Average {
                 let mut solution = PatchSolution { diameter: patches.diameter[patch], ..PatchSolution::default() };
                 for k in 0..2 {
                     let (a, b) = (self.sums[0][2 * patch + k], self.sums[1][2 * patch + k]);
-                    let factor = optics.reflectance[patch].as_dvec3() * (scale / patches.area[patch]);
+                    let area = patches.open_area((2 * patch + k) as u32);
+                    let factor = optics.reflectance[patch].as_dvec3() * (scale / area);
                     solution.radiosity[k] = (factor * (a + b)).as_vec3();
                     solution.deviation[k] = ((factor * (a - b)).element_sum() / 3.0).abs() as f32;
                 }
@@ -296,6 +298,7 @@ impl Average {
             patches: patches.len(),
             patch_size: patches.size as f32,
             map: patches.map,
+            normals: patches.normals,
             rays: self.rays,
             shots: self.shots,
             error,

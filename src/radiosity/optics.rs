@@ -9,12 +9,9 @@ use crate::backend::Hit;
 use crate::error::{Error, Result};
 use crate::sampling;
 use crate::scene::{Material, Scene};
-use crate::shading::{Bsdf, SurfacePoint};
+use crate::shading::{Bsdf, Lobes, SurfacePoint};
 use crate::simplify::TriangleSource;
 
-/// Roughness under which lobes count as highly directional. With the smallest, only mirrors and glass are followed, and
-/// glossy reflection is part of the diffuse reflectance.
-pub(super) const GLOSSY_THRESHOLD: f32 = 0.0;
 
 /// Points at which a material that varies over a patch is looked at.
 const POINTS: u32 = 16;
@@ -118,7 +115,7 @@ fn mean(input: &RadiosityScene<'_>, patches: &Patches, patch: u32) -> Mean {
         let point = SurfacePoint::new(scene, &Hit { t: 0.0, u: uv.x, v: uv.y, triangle });
         // Directions like those of the reflected light that is wanted. The back reflects like the front.
         let toward = sampling::basis(point.shading_normal) * sampling::cosine_hemisphere(Vec2::new(s[2], s[3]));
-        let bsdf = Bsdf::new(scene, &point, toward, GLOSSY_THRESHOLD);
+        let bsdf = Bsdf::new(scene, &point, toward, Lobes::MIRRORS);
         reflectance += bsdf.albedo_low().as_dvec3();
         specular |= bsdf.albedo_high() != Vec3::ZERO;
         if look.is_emitter() {

@@ -8,11 +8,11 @@ use rayon::prelude::*;
 
 use super::RadiosityScene;
 use super::ledger::Tally;
-use super::optics::{GLOSSY_THRESHOLD, Optics};
+use super::optics::Optics;
 use super::patches::Patches;
 use crate::backend::{Coherence, Hit, Ray, Visible};
 use crate::sampling;
-use crate::shading::{Bsdf, SurfacePoint};
+use crate::shading::{Bsdf, Lobes, SurfacePoint};
 use crate::simplify::TriangleSource;
 
 /// Rays traced in one call of the backend.
@@ -165,7 +165,7 @@ impl Tracer<'_> {
                 let shot = &shots[at];
                 let index = u64::from(shot.rays) - (ends[at] - k);
                 let s = sampling::sobol(index as u32, 0, shot.stream);
-                let point = self.patches.point(geometry, shot.side / 2, [s[0], s[1]]);
+                let point = self.patches.open_point(geometry, shot.side, [s[0], s[1]]);
                 let local = sampling::cosine_hemisphere(Vec2::new(s[2], s[3]));
                 let direction = sampling::basis(side_normal(&point, shot.side)) * local;
                 let id = u64::from(shot.stream) << 32 | index;
@@ -256,7 +256,7 @@ impl Tracer<'_> {
         };
         let scene = self.input.scene;
         let point = SurfacePoint::new(scene, &Hit { triangle, ..*hit });
-        let bsdf = Bsdf::new(scene, &point, -direction, GLOSSY_THRESHOLD);
+        let bsdf = Bsdf::new(scene, &point, -direction, Lobes::MIRRORS);
         let mut random = load.random(depth);
         let sample = bsdf.sample_high([random(), random(), random()])?;
         let material = &scene.materials[scene.mesh.object(triangle).material as usize];

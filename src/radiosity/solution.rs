@@ -10,6 +10,8 @@ use super::patches::PatchMap;
 pub struct Solution {
     pub(super) map: PatchMap,
     pub(super) of_patch: Vec<PatchSolution>,
+    /// Unit normal of each triangle.
+    pub(super) normals: Vec<Vec3>,
     /// Energy balance.
     pub ledger: Ledger,
     /// Number of patches.
@@ -46,6 +48,11 @@ impl Solution {
     /// (counter-clockwise) or back side.
     pub fn radiosity(&self, triangle: u32, u: f32, v: f32, front: bool) -> Vec3 {
         self.at(triangle, u, v).radiosity[usize::from(!front)]
+    }
+
+    /// Whether a ray into `direction` meets the front of a triangle of the geometry.
+    pub fn is_front(&self, triangle: u32, direction: Vec3) -> bool {
+        self.normals[triangle as usize].dot(direction) < 0.0
     }
 
     /// Standard error of the mean over bands of [`Solution::radiosity`], W/m^2: half the difference of two independent halves,

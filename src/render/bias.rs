@@ -10,6 +10,7 @@ use super::integrator::{Workspace, World};
 use super::path::{Arrival, Path};
 use crate::sampling::{hash_all, sobol};
 use crate::scene::Camera;
+use crate::shading::Lobes;
 use glam::{Vec2, Vec3};
 
 /// Paths that are traced as one batch.
@@ -46,7 +47,8 @@ impl Bias {
 
 /// Measures the bias with `samples` pairs of paths over the whole image.
 pub fn measure(world: &World<'_>, camera: &Camera, aspect: f32, samples: u32, seed: u32) -> Bias {
-    let reference = World { far: None, ..*world };
+    let gather_lobes = Lobes { least_roughness: 0.0, ..world.gather_lobes };
+    let reference = World { far: None, gather_lobes, ..*world };
     let batches: Vec<Sums> = (0..samples.div_ceil(BATCH))
         .into_par_iter()
         .map_init(Workspace::default, |ws, batch| {

@@ -27,7 +27,7 @@ use crate::lighting::{Lights, shadow};
 use crate::radiosity::Solution;
 use crate::sampling::{hash_all, sobol};
 use crate::scene::{Camera, Scene};
-use crate::shading::{Bsdf, SurfacePoint};
+use crate::shading::{Bsdf, Lobes, SurfacePoint};
 use crate::simplify::{Simplified, SimplifiedGeometry, TriangleSource};
 
 /// Distance that shadow rays stop short of the light, relative: covers the rounding of an intersection with the light's own
@@ -61,8 +61,9 @@ pub struct World<'a> {
     pub simplified: Option<&'a Simplified>,
     /// The far field; without one all light is path traced (MCPT).
     pub far: Option<FarField<'a>>,
-    /// Roughness under which a specular lobe counts as highly directional.
-    pub glossy_threshold: f32,
+    /// Specular lobes at points that gather rays meet. View chains use the same threshold but see every surface as smooth
+    /// as it is.
+    pub gather_lobes: Lobes,
     /// Scattering events after which paths end.
     pub max_depth: u32,
 }
@@ -76,10 +77,20 @@ pub struct FarField<'a> {
     pub geometry: &'a SimplifiedGeometry,
     /// Radiosities of their patches.
     pub solution: &'a Solution,
+    /// Which of its triangles reflect only diffusely as far as radiosity is concerned, and emit nothing.
+    pub plain: &'a [bool],
     /// Mean length of a gather ray's near part; 0 for PMM.
     pub r_thresh: f32,
     /// Where near parts need the detailed scene; `None` when the geometry is complete.
     pub nearness: Option<&'a Nearness>,
+}
+
+impl FarField<'_> {
+    /// Radiance without emission that a ray into `direction` meets at a hit on the far field's geometry, W/(sr m^2).
+    pub fn reflected(&self, hit: &Hit, direction: Vec3) -> Vec3 {
+        let front = self.solution.is_front(hit.triangle, direction);
+        self.solution.radiosity(hit.triangle, hit.u, hit.v, front) * FRAC_1_PI
+    }
 }
 
 /// Rays traced, by purpose.
@@ -354,24 +365,26 @@ impl<'a> World<'a> {
         passes: Passes,
         capture: &mut Option<&mut Vec<Path>>,
     ) {
-        let path = &ws.paths[index as usize];
-        let TriangleSource::Scene { triangle } = far.geometry.sources[hit.triangle as usize] else {
-            ws.note_lookup(index, hit.t);
-            let path = &ws.paths[index as usize];
-            let radiosity = far.solution.radiosity(hit.triangle, hit.u, hit.v, true);
-            ws.lores[path.trial as usize] += path.throughput * radiosity * FRAC_1_PI;
-            return;
-        };
-        // Within reach, and where the patch is large against the ray, the surface's own light is worked out; the
-        // triangle is the same one in the detailed scene.
+        let path = ws.paths[index as usize];
+        // Within reach, and where the patch is large against the ray, the surface's own light is worked out.
         let near = hit.t <= path.near
             || (far.r_thresh > 0.0 && far.solution.patch_diameter(hit.triangle, hit.u, hit.v) > hit.t);
-        let look_up = (!near).then_some(hit.triangle);
-        if near {
+        let source = far.geometry.sources[hit.triangle as usize];
+        if near && matches!(source, TriangleSource::Scene { .. }) {
             ws.note_near(index);
         } else {
             ws.note_lookup(index, hit.t);
         }
+        let TriangleSource::Scene { triangle } = source else {
+            ws.lores[path.trial as usize] += path.throughput * far.reflected(hit, path.ray.direction);
+            return;
+        };
+        if !near && far.plain[hit.triangle as usize] {
+            ws.lores[path.trial as usize] += path.throughput * far.reflected(hit, path.ray.direction);
+            return;
+        }
+        // The triangle is the same one in the detailed scene.
+        let look_up = (!near).then_some(hit.triangle);
         self.shade(ws, index, &Hit { triangle, ..*hit }, look_up, passes, capture);
     }
 
@@ -391,7 +404,13 @@ impl<'a> World<'a> {
         let point = SurfacePoint::new(self.scene, hit);
         let outgoing = -path.ray.direction;
         let front = point.geometric_normal.dot(outgoing) > 0.0;
-        let bsdf = Bsdf::new(self.scene, &point, outgoing, self.glossy_threshold);
+        let lobes = match look_up {
+            // The radiosity solution reflects everything diffusely that is no perfect mirror.
+            Some(_) => Lobes::MIRRORS,
+            None if path.gathers => self.gather_lobes,
+            None => Lobes { least_roughness: 0.0, ..self.gather_lobes },
+        };
+        let bsdf = Bsdf::new(self.scene, &point, outgoing, lobes);
 
         let emission = bsdf.emission();
         if emission != Vec3::ZERO {
@@ -443,8 +462,7 @@ impl<'a> World<'a> {
         }
         let throughput = path.throughput / (1.0 - choose_high);
         if let (Some(triangle), Some(far)) = (look_up, &self.far) {
-            let radiosity = far.solution.radiosity(triangle, hit.u, hit.v, front);
-            ws.lores[trial] += throughput * radiosity * FRAC_1_PI;
+            ws.lores[trial] += throughput * far.reflected(&Hit { triangle, ..*hit }, path.ray.direction);
             return;
         }
         if !passes.lores || low == Vec3::ZERO {

@@ -1,7 +1,5 @@
 //! A radiosity solution shown directly: what the camera sees of patches, without any gather.
 
-use std::f32::consts::FRAC_1_PI;
-
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
@@ -11,7 +9,7 @@ use super::integrator::{FarField, World};
 use crate::backend::{Coherence, Hit, Ray, Visible};
 use crate::sampling::{hash_all, sobol};
 use crate::scene::Camera;
-use crate::shading::{Bsdf, SurfacePoint};
+use crate::shading::{Bsdf, Lobes, SurfacePoint};
 use crate::simplify::TriangleSource;
 
 /// Renders radiosity plus emission of the first surface of `far`, `min_trials` rays a pixel; everything goes to HIRES.
@@ -44,13 +42,12 @@ fn radiance(world: &World<'_>, far: &FarField<'_>, ray: &Ray, hit: &Hit) -> Vec3
     if !hit.is_hit() {
         return Vec3::ZERO;
     }
+    let reflected = far.reflected(hit, ray.direction);
     match far.geometry.sources[hit.triangle as usize] {
-        TriangleSource::BoxFace { .. } => far.solution.radiosity(hit.triangle, hit.u, hit.v, true) * FRAC_1_PI,
+        TriangleSource::BoxFace { .. } => reflected,
         TriangleSource::Scene { triangle } => {
             let point = SurfacePoint::new(world.scene, &Hit { triangle, ..*hit });
-            let front = point.geometric_normal.dot(ray.direction) < 0.0;
-            let emission = Bsdf::new(world.scene, &point, -ray.direction, world.glossy_threshold).emission();
-            emission + far.solution.radiosity(hit.triangle, hit.u, hit.v, front) * FRAC_1_PI
+            reflected + Bsdf::new(world.scene, &point, -ray.direction, Lobes::MIRRORS).emission()
         }
     }
 }

@@ -119,6 +119,13 @@ impl Material {
         self.emission.max_element() > 0.0
     }
 
+    /// Whether light may leave it in a single direction for each that it comes from: smooth metals and coats, glass.
+    pub fn may_be_sharp(&self) -> bool {
+        let specular = self.metallic > 0.0 || self.specular > 0.0;
+        let smooth = self.roughness < MAX_SMOOTH_ROUGHNESS || self.metallic_roughness_texture.is_some();
+        self.transmission > 0.0 || (specular && smooth)
+    }
+
     /// Whether it is Lambertian everywhere: no specular lobe, no transmission, no metal.
     pub fn is_lambertian(&self) -> bool {
         self.metallic == 0.0 && self.specular == 0.0 && self.transmission == 0.0

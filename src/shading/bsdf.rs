@@ -50,10 +50,25 @@ pub struct Bsdf {
     layered: Option<Layered>,
 }
 
+/// How the specular lobes of opaque surfaces are told apart.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lobes {
+    /// Roughness below which a specular lobe counts as highly directional.
+    pub threshold: f32,
+    /// Smoother reflection of opaque surfaces is taken to be this rough (a bias: reflections blur, energy is kept). What is at
+    /// least as rough as the threshold leaves no opaque surface highly directional. Zero changes nothing.
+    pub least_roughness: f32,
+}
+
+impl Lobes {
+    /// Only perfectly smooth reflection is highly directional.
+    pub const MIRRORS: Lobes = Lobes { threshold: 0.0, least_roughness: 0.0 };
+}
+
 impl Bsdf {
     /// The scattering function at `point` of material `scene.mesh.object(point.triangle).material` for light leaving
-    /// towards `outgoing`; `glossy_threshold` is the roughness below which a specular lobe counts as highly directional.
-    pub fn new(scene: &Scene, point: &SurfacePoint, outgoing: Vec3, glossy_threshold: f32) -> Self {
+    /// towards `outgoing`.
+    pub fn new(scene: &Scene, point: &SurfacePoint, outgoing: Vec3, lobes: Lobes) -> Self {
         let object = scene.mesh.object(point.triangle);
         let material = &scene.materials[object.material as usize];
         let front = outgoing.dot(point.geometric_normal) >= 0.0;
@@ -72,8 +87,11 @@ impl Bsdf {
                 roughness *= texel.y;
                 metallic *= texel.z;
             }
+            if material.transmission == 0.0 {
+                roughness = roughness.max(lobes.least_roughness);
+            }
             let at = Local { normal: shading_normal, outgoing, base_color, metallic, roughness, front };
-            Layered::new(material, object.kind, &at, glossy_threshold)
+            Layered::new(material, object.kind, &at, lobes.threshold)
         });
         Bsdf {
             emission,

@@ -15,5 +15,5 @@ mod testing;
 #[cfg(test)]
 mod tests;
 
-pub use bsdf::{Bsdf, BsdfSample};
+pub use bsdf::{Bsdf, BsdfSample, Lobes};
 pub use point::SurfacePoint;

@@ -6,7 +6,7 @@
 use glam::{Vec2, Vec3};
 
 use super::testing::scene_of;
-use super::{Bsdf, SurfacePoint, albedo};
+use super::{Bsdf, Lobes, SurfacePoint, albedo};
 use crate::backend::{Hit, PartKind};
 use crate::sampling::{hash_all, sobol, uniform_sphere, unit};
 use crate::scene::{Material, Scene};
@@ -28,7 +28,7 @@ fn towards(cosine: f32) -> Vec3 {
 }
 
 fn bsdf(scene: &Scene, outgoing: Vec3, threshold: f32) -> Bsdf {
-    Bsdf::new(scene, &SurfacePoint::new(scene, &HIT), outgoing, threshold)
+    Bsdf::new(scene, &SurfacePoint::new(scene, &HIT), outgoing, Lobes { threshold, ..Lobes::MIRRORS })
 }
 
 fn metal(base_color: Vec3, roughness: f32) -> Material {

@@ -4,6 +4,7 @@
 //! of one surface) and each chart is cut by a [`grid`]. A patch is what lies in one cell, on both sides.
 
 mod charts;
+mod exposure;
 mod grid;
 mod sampling;
 
@@ -13,8 +14,11 @@ use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
 use crate::error::{Error, Result};
+use crate::radiosity::RadiosityScene;
+use crate::shading::SurfacePoint;
 use crate::simplify::{Cluster, SimplifiedGeometry, TriangleSource};
 use charts::{Charts, Frame};
+use exposure::Exposure;
 use grid::Grid;
 
 const NONE: u32 = u32::MAX;
@@ -37,6 +41,7 @@ pub(super) struct Patches {
     pieces: Vec<Piece>,
     /// Area of one side of each patch.
     pub area: Vec<f64>,
+    exposure: Exposure,
     /// Diameter of each patch.
     pub diameter: Vec<f32>,
     /// Unit normal of each triangle.
@@ -131,6 +136,7 @@ impl Patches {
             first_piece: vec![0],
             pieces: Vec::new(),
             area: Vec::new(),
+            exposure: Exposure::everything(0),
             diameter: Vec::new(),
             normals,
             box_cell: Vec::new(),
@@ -139,7 +145,23 @@ impl Patches {
         for ((grid, triangles), part) in grids.iter().zip(&members).zip(parts) {
             patches.append(geometry, grid, triangles, part);
         }
+        patches.exposure = Exposure::everything(2 * patches.len());
         Ok(patches)
+    }
+
+    /// Finds out which parts of the patches are covered and leaves these out of all that follows.
+    pub fn leave_out_covered(&mut self, input: &RadiosityScene<'_>, seed: u32) {
+        self.exposure = Exposure::find(input, self, seed);
+    }
+
+    /// Area of the part of a side that lies open.
+    pub fn open_area(&self, side: u32) -> f64 {
+        self.area[side as usize / 2] * self.exposure.share(side)
+    }
+
+    /// The point on the open part of a side that belongs to `s`, uniform in 0..1.
+    pub fn open_point(&self, geometry: &SimplifiedGeometry, side: u32, s: [f32; 2]) -> SurfacePoint {
+        self.point(geometry, side / 2, self.exposure.onto_open(side, s))
     }
 
     fn append(&mut self, geometry: &SimplifiedGeometry, grid: &Grid, triangles: &[u32], part: Part) {
