@@ -4,6 +4,7 @@ pub mod compare;
 pub mod info;
 pub mod options;
 pub mod render;
+pub mod simplify;
 pub mod validate;
 
 use std::process::ExitCode;
@@ -31,6 +32,8 @@ enum Command {
     Render(render::Options),
     /// Show what is in a scene and what would be done with it
     Info(info::Options),
+    /// Write the simplified scene and say how well it stands for the detailed one
+    Simplify(simplify::Options),
     /// Compare Embree with obvhs, ray by ray, on a scene's own rays
     Validate(validate::Options),
     /// Error metrics of an image against a reference
@@ -51,6 +54,7 @@ pub fn run() -> ExitCode {
     let outcome = match &arguments.command {
         Command::Render(options) => render::run(options),
         Command::Info(options) => info::run(options),
+        Command::Simplify(options) => simplify::run(options),
         Command::Validate(options) => validate::run(options),
         Command::Compare(options) => compare::run(options),
     };

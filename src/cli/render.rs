@@ -67,7 +67,7 @@ pub struct Options {
     #[command(flatten)]
     method: MethodOptions,
     /// Layers to write beside R,G,B where the format has named channels: hires, lores, hires_dev, lores_dev, albedo, normal,
-    /// depth, trials [default: all]
+    /// depth, trials, class, cluster, lookup_distance, near_share [default: all]
     #[arg(long, value_name = "NAME,...", value_delimiter = ',', help_heading = "Output")]
     layers: Option<Vec<Layer>>,
     /// Stops by which formats for screens are brightened [default: automatic]

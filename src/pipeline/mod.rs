@@ -13,13 +13,12 @@ pub use stats::Stats;
 
 use crate::backend::embree::EmbreeBackend;
 use crate::backend::obvhs::ObvhsBackend;
-use crate::backend::{HitFilter, PartKind, RayBackend, RayScene, TriangleSet};
+use crate::backend::{PartKind, RayBackend, RayScene, TriangleSet};
 use crate::error::{Error, Result};
 use crate::lighting::Lights;
 use crate::progress::Progress;
 use crate::radiosity::{self, RadiosityParams, RadiosityScene, Solution};
 use crate::render::{FarField, Nearness, World};
-use crate::scene::alpha::AlphaFilter;
 use crate::scene::{Camera, Scene};
 use crate::shading::Lobes;
 use crate::simplify::{self, Simplified, SimplifiedGeometry, SimplifyParams, TriangleSource};
@@ -68,15 +67,8 @@ impl Prepared {
     ) -> Result<Prepared> {
         settings.check()?;
         let backend = settings.backend.create(settings.threads)?;
-        let filter: Arc<dyn HitFilter> = Arc::new(AlphaFilter::new(Arc::clone(&scene)));
         let start = Instant::now();
-        let parts = scene.mesh.parts();
-        let detailed = backend.build(&TriangleSet {
-            positions: &scene.mesh.positions,
-            triangles: &scene.mesh.triangles,
-            parts: &parts,
-            filter: Some(Arc::clone(&filter)),
-        })?;
+        let detailed = build_detailed(&scene, backend.as_ref())?;
         let lights = Lights::new(&scene);
         stats.seconds.build += start.elapsed().as_secs_f64();
         stats.backend = backend.name();
@@ -86,7 +78,7 @@ impl Prepared {
         let far = match settings.method {
             Method::Mcpt => None,
             Method::Gsii if settings.r_thresh() == f32::INFINITY => None,
-            _ => Some(Far::new(&scene, &lights, backend.as_ref(), &filter, &settings, progress, stats)?),
+            _ => Some(Far::new(&scene, &lights, backend.as_ref(), &settings, progress, stats)?),
         };
         stats.parameters = settings.parameters();
         Ok(Prepared { scene, lights, detailed, far, settings })
@@ -99,6 +91,7 @@ impl Prepared {
             lights: &self.lights,
             detailed: self.detailed.as_ref(),
             has_panes: self.scene.mesh.objects.iter().any(|o| o.kind == PartKind::Pane),
+            simplified: self.far.as_ref().and_then(|far| far.simplified.as_ref()),
             far: self.far.as_ref().map(|far| FarField {
                 rays: far.rays.as_ref(),
                 geometry: &far.geometry,
@@ -122,7 +115,6 @@ impl Far {
         scene: &Arc<Scene>,
         lights: &Lights,
         backend: &dyn RayBackend,
-        filter: &Arc<dyn HitFilter>,
         settings: &Settings,
         progress: &Progress,
         stats: &mut Stats,
@@ -139,8 +131,7 @@ impl Far {
         stats.seconds.simplify += start.elapsed().as_secs_f64();
 
         let start = Instant::now();
-        let filter = geometry.filter(Arc::clone(filter));
-        let rays = backend.build(&TriangleSet { filter: Some(filter), ..geometry.triangle_set() })?;
+        let rays = geometry.build(scene, backend)?;
         let nearness = (!complete).then(|| {
             let reach = 1.5 * settings.r_thresh();
             let clusters = simplified.clusters.iter().map(|c| c.bounds.union(c.equivalent_box.bounds()));
@@ -169,6 +160,37 @@ fn is_plain(scene: &Scene, source: &TriangleSource) -> bool {
             !material.is_emitter() && !material.may_be_sharp()
         }
     }
+}
+
+/// Simplifies a scene and does nothing else; gives the settings with every automatic choice filled in.
+///
+/// # Errors
+/// Usage errors in the settings, backend failures.
+pub fn simplify_only(
+    scene: &Arc<Scene>,
+    camera: &Camera,
+    mut settings: Settings,
+    progress: &Progress,
+    stats: &mut Stats,
+) -> Result<(Simplified, Settings)> {
+    settings.check()?;
+    let backend = settings.backend.create(settings.threads)?;
+    if settings.r_thresh.is_none() || settings.patch_size.is_none() {
+        let detailed = build_detailed(scene, backend.as_ref())?;
+        auto::fill_in(&mut settings, scene, detailed.as_ref(), camera);
+    }
+    let simplified = simplify::simplify(scene, backend.as_ref(), &settings.simplify_params(), progress)?;
+    stats.record_simplified(&simplified);
+    Ok((simplified, settings))
+}
+
+fn build_detailed(scene: &Arc<Scene>, backend: &dyn RayBackend) -> Result<Box<dyn RayScene>> {
+    backend.build(&TriangleSet {
+        positions: &scene.mesh.positions,
+        triangles: &scene.mesh.triangles,
+        parts: &scene.mesh.parts(),
+        filter: simplify::scene_filter(scene),
+    })
 }
 
 impl BackendKind {
@@ -209,6 +231,7 @@ impl Settings {
             beta: self.beta,
             box_fit: self.box_fit,
             crease_angle: self.crease_angle,
+            longest: self.longest_cluster,
             face_resolution: self.face_resolution,
             seed: self.seed,
         }

@@ -7,7 +7,7 @@ use serde_json::{Map, Value, json};
 
 use crate::error::{Error, Result};
 use crate::radiosity::{DirectLight, Focus};
-use crate::simplify::BoxFit;
+use crate::simplify::{self, BoxFit};
 
 /// The paper's methods.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, clap::ValueEnum)]
@@ -61,6 +61,8 @@ pub struct Settings {
     pub box_fit: BoxFit,
     /// Largest angle between neighbouring triangles of one surface, radians.
     pub crease_angle: f32,
+    /// Largest diagonal of a cluster in units of `r_thresh`, 1 or more.
+    pub longest_cluster: f32,
     /// Patches along each edge of a box face.
     pub face_resolution: u32,
     /// Target edge length of patches, scene length units.
@@ -99,6 +101,7 @@ impl Default for Settings {
             beta: 1.0 / (2.0 * PI),
             box_fit: BoxFit::Flux,
             crease_angle: 30.0_f32.to_radians(),
+            longest_cluster: simplify::LONGEST_CLUSTER,
             face_resolution: 2,
             patch_size: None,
             unshot: 0.01,

@@ -143,6 +143,15 @@ const LEAST_RAYS: u64 = 1 << 15;
 /// Solutions that may be averaged to reach the error.
 const MAX_ROUNDS: u32 = 4;
 
+/// The number of patches that [`solve`] would have on this geometry.
+///
+/// # Errors
+/// As [`solve`], for parameters out of range.
+pub fn count_patches(geometry: &SimplifiedGeometry, clusters: &[Cluster], params: &RadiosityParams) -> Result<usize> {
+    params.check()?;
+    Ok(Patches::new(geometry, clusters, f64::from(params.patch_size), params.max_patches)?.len())
+}
+
 /// Solves for all radiosities.
 ///
 /// # Errors

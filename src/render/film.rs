@@ -2,6 +2,9 @@
 
 use glam::Vec3;
 
+use crate::sampling::{hash_all, unit};
+use crate::simplify::{Class, Simplified};
+
 /// Pixels along each edge of a film tile.
 pub const TILE: u32 = 8;
 
@@ -79,6 +82,34 @@ pub struct Feature {
     pub depth: f32,
     /// Trials that hit something.
     pub hits: u32,
+    /// 1 where the surface is complex and in a cluster.
+    pub clustered: f32,
+    /// 1 where the surface is complex and was dropped.
+    pub dropped: f32,
+    /// False colour of the cluster, black where there is none.
+    pub cluster: Vec3,
+    /// Radiosities looked up by gather rays.
+    pub lookups: u32,
+    /// Summed lengths of the rays that looked them up.
+    pub lookup_distance: f32,
+    /// Gather rays that met the detailed scene within reach.
+    pub near: u32,
+}
+
+impl Feature {
+    /// Records what simplification made of the surface that a triangle belongs to.
+    pub fn classify(&mut self, simplified: &Simplified, triangle: u32) {
+        let surface = simplified.surface_of_triangle[triangle as usize];
+        match simplified.surfaces[surface as usize].class {
+            Class::Normal => {}
+            Class::Complex { cluster: None } => self.dropped = 1.0,
+            Class::Complex { cluster: Some(cluster) } => {
+                self.clustered = 1.0;
+                // Neighbouring numbers get unlike colours, none of them dark.
+                self.cluster = Vec3::from_array([0, 1, 2].map(|band| 0.2 + 0.8 * unit(hash_all(&[cluster, band]))));
+            }
+        }
+    }
 }
 
 impl std::ops::AddAssign for Feature {
@@ -87,6 +118,12 @@ impl std::ops::AddAssign for Feature {
         self.normal += o.normal;
         self.depth += o.depth;
         self.hits += o.hits;
+        self.clustered += o.clustered;
+        self.dropped += o.dropped;
+        self.cluster += o.cluster;
+        self.lookups += o.lookups;
+        self.lookup_distance += o.lookup_distance;
+        self.near += o.near;
     }
 }
 

@@ -28,7 +28,7 @@ use crate::radiosity::Solution;
 use crate::sampling::{hash_all, sobol};
 use crate::scene::{Camera, Scene};
 use crate::shading::{Bsdf, Lobes, SurfacePoint};
-use crate::simplify::{SimplifiedGeometry, TriangleSource};
+use crate::simplify::{Simplified, SimplifiedGeometry, TriangleSource};
 
 /// Distance that shadow rays stop short of the light, relative: covers the rounding of an intersection with the light's own
 /// triangle.
@@ -57,6 +57,8 @@ pub struct World<'a> {
     pub detailed: &'a dyn RayScene,
     /// Whether the detailed scene has surfaces that transmit without bending.
     pub has_panes: bool,
+    /// How the far field's scene came about, for layers that show it.
+    pub simplified: Option<&'a Simplified>,
     /// The far field; without one all light is path traced (MCPT).
     pub far: Option<FarField<'a>>,
     /// Specular lobes at points that gather rays meet. View chains use the same threshold but see every surface as smooth
@@ -323,6 +325,7 @@ impl<'a> World<'a> {
         for k in 0..ws.traced.len() {
             let (index, hit) = (ws.traced[k], ws.hits[k]);
             if hit.is_hit() {
+                ws.note_near(index);
                 self.shade(ws, index, &hit, None, passes, capture);
             } else if ws.paths[index as usize].near.is_finite() {
                 // The rest of the ray meets the simplified scene.
@@ -362,11 +365,16 @@ impl<'a> World<'a> {
         passes: Passes,
         capture: &mut Option<&mut Vec<Path>>,
     ) {
-        let path = &ws.paths[index as usize];
+        let path = ws.paths[index as usize];
         // Within reach, and where the patch is large against the ray, the surface's own light is worked out.
         let near = hit.t <= path.near
             || (far.r_thresh > 0.0 && far.solution.patch_diameter(hit.triangle, hit.u, hit.v) > hit.t);
         let source = far.geometry.sources[hit.triangle as usize];
+        if near && matches!(source, TriangleSource::Scene { .. }) {
+            ws.note_near(index);
+        } else {
+            ws.note_lookup(index, hit.t);
+        }
         let TriangleSource::Scene { triangle } = source else {
             ws.lores[path.trial as usize] += path.throughput * far.reflected(hit, path.ray.direction);
             return;
@@ -415,7 +423,10 @@ impl<'a> World<'a> {
             && let Some(feature) = ws.features.get_mut(trial)
         {
             let normal = if front { point.shading_normal } else { -point.shading_normal };
-            *feature = Feature { albedo: low + high, normal, depth: hit.t, hits: 1 };
+            *feature = Feature { albedo: low + high, normal, depth: hit.t, hits: 1, ..Feature::default() };
+            if let Some(simplified) = self.simplified {
+                feature.classify(simplified, hit.triangle);
+            }
         }
         if path.depth >= self.max_depth {
             return;
@@ -538,6 +549,25 @@ impl Workspace {
     /// LORES sums of the last batch.
     pub(super) fn take_lores(&mut self) -> Vec<Vec3> {
         std::mem::take(&mut self.lores)
+    }
+
+    /// A gather ray ended in the detailed scene.
+    fn note_near(&mut self, path: u32) {
+        let path = &self.paths[path as usize];
+        if path.gathers
+            && let Some(feature) = self.features.get_mut(path.trial as usize)
+        {
+            feature.near += 1;
+        }
+    }
+
+    /// A gather ray of length `distance` looked a radiosity up.
+    fn note_lookup(&mut self, path: u32, distance: f32) {
+        let trial = self.paths[path as usize].trial;
+        if let Some(feature) = self.features.get_mut(trial as usize) {
+            feature.lookups += 1;
+            feature.lookup_distance += distance;
+        }
     }
 
     /// Forgets the last batch and makes room for the sums of `trials` trials.

@@ -26,11 +26,19 @@ pub enum Layer {
     Depth,
     /// Trials of both passes.
     Trials,
+    /// Shares of the pixel that are normal, clustered and dropped surfaces.
+    Class,
+    /// False colour by cluster.
+    Cluster,
+    /// Mean length of the gather rays that looked radiosities up.
+    LookupDistance,
+    /// Share of gather rays that ended in the detailed scene, within reach.
+    NearShare,
 }
 
 impl Layer {
     /// All of them, in the order in which they are written.
-    pub const ALL: [Layer; 8] = [
+    pub const ALL: [Layer; 12] = [
         Layer::Hires,
         Layer::Lores,
         Layer::HiresDev,
@@ -39,6 +47,10 @@ impl Layer {
         Layer::Normal,
         Layer::Depth,
         Layer::Trials,
+        Layer::Class,
+        Layer::Cluster,
+        Layer::LookupDistance,
+        Layer::NearShare,
     ];
 
     /// Name on the command line and in files.
@@ -52,12 +64,16 @@ impl Layer {
             Layer::Normal => "normal",
             Layer::Depth => "depth",
             Layer::Trials => "trials",
+            Layer::Class => "class",
+            Layer::Cluster => "cluster",
+            Layer::LookupDistance => "lookup_distance",
+            Layer::NearShare => "near_share",
         }
     }
 
     /// Whether the renderer must record features for it.
     pub fn is_feature(self) -> bool {
-        matches!(self, Layer::Albedo | Layer::Normal | Layer::Depth)
+        !matches!(self, Layer::Hires | Layer::Lores | Layer::HiresDev | Layer::LoresDev | Layer::Trials)
     }
 }
 
@@ -98,6 +114,35 @@ pub fn develop(film: &Film, layers: &[Layer]) -> Image {
                 scalar(&|p| match p.feature.hits {
                     0 => f32::INFINITY,
                     hits => p.feature.depth / hits as f32,
+                }),
+            ),
+            Layer::Class => {
+                let share = |x: f32, p: &Pixel| x / p.hires.trials().max(1) as f32;
+                let shares = rgb(&|p| {
+                    let f = &p.feature;
+                    Vec3::new(
+                        share(f.hits as f32 - f.clustered - f.dropped, p),
+                        share(f.clustered, p),
+                        share(f.dropped, p),
+                    )
+                });
+                for (i, class) in ["normal", "clustered", "dropped"].into_iter().enumerate() {
+                    image.push(format!("{name}.{class}"), shares.iter().map(|s| s[i]).collect());
+                }
+            }
+            Layer::Cluster => image.push_rgb(name, &rgb(&|p| p.feature.cluster / p.hires.trials().max(1) as f32)),
+            Layer::LookupDistance => image.push(
+                name,
+                scalar(&|p| match p.feature.lookups {
+                    0 => f32::INFINITY,
+                    n => p.feature.lookup_distance / n as f32,
+                }),
+            ),
+            Layer::NearShare => image.push(
+                name,
+                scalar(&|p| {
+                    let gathers = p.feature.near + p.feature.lookups;
+                    p.feature.near as f32 / gathers.max(1) as f32
                 }),
             ),
             Layer::Trials => {

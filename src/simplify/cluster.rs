@@ -1,5 +1,7 @@
 //! Grouping small surfaces: connected ones first, then neighbours, bottom-up.
 //!
+//! Groups remember what they were merged from: one whose box turns out to stand badly for it is split again.
+//!
 //! Agglomeration is PLOC (Meister and Bittner 2018): groups lie in Morton order, each looks for its cheapest partner within a
 //! window, and pairs that chose each other merge. O(n log n), deterministic, and unlike an octree it cuts nothing at cell
 //! walls.
@@ -26,22 +28,66 @@ const MOST_ROUNDS: usize = 100;
 /// box would gather far from where most of it is.
 const LEAST_FILL: f64 = 0.01;
 
-/// A candidate cluster.
+/// The same for clusters longer than what may always be one: only what is dense hides its own far parts.
+const LEAST_FILL_LONG: f64 = 0.1;
+
+/// How large clusters may become.
+#[derive(Clone, Copy, Debug)]
+pub struct Extent {
+    /// Largest diagonal of a cluster that needs no proof; see [`classify::size_limit`](super::classify::size_limit).
+    pub compact: f32,
+    /// Largest diagonal of any cluster, at least `compact`.
+    pub longest: f32,
+}
+
+/// A candidate cluster, and what it was made of.
 #[derive(Clone, Debug)]
 pub struct Group {
-    /// Surfaces, ascending.
-    pub surfaces: Vec<u32>,
     /// Bounds.
     pub bounds: Aabb,
     /// Summed area of the surfaces, one side.
     pub area: f64,
+    /// Number of triangles.
+    pub triangles: u32,
+    /// The lowest of its surfaces.
+    pub first: u32,
+    content: Content,
+}
+
+#[derive(Clone, Debug)]
+enum Content {
+    /// One surface or several connected ones.
+    Surfaces(Vec<u32>),
+    Pair(Box<[Group; 2]>),
+    /// Merged into another group; swept up at the end of the round.
+    Gone,
 }
 
 impl Group {
     fn of(members: Vec<u32>, surfaces: &[Surface]) -> Self {
-        let bounds = members.iter().fold(Aabb::EMPTY, |b, &s| b.union(surfaces[s as usize].bounds));
-        let area = members.iter().map(|&s| surfaces[s as usize].area).sum();
-        Group { surfaces: members, bounds, area }
+        let of = |&s: &u32| &surfaces[s as usize];
+        Group {
+            bounds: members.iter().fold(Aabb::EMPTY, |b, s| b.union(of(s).bounds)),
+            area: members.iter().map(|s| of(s).area).sum(),
+            triangles: members.iter().map(|s| of(s).triangles).sum(),
+            first: members.iter().copied().min().unwrap_or(u32::MAX),
+            content: Content::Surfaces(members),
+        }
+    }
+
+    fn pair(a: Group, b: Group) -> Self {
+        Group {
+            bounds: a.bounds.union(b.bounds),
+            area: a.area + b.area,
+            triangles: a.triangles + b.triangles,
+            first: a.first.min(b.first),
+            content: Content::Pair(Box::new([a, b])),
+        }
+    }
+
+    fn take(&mut self) -> Group {
+        let gone = Group { content: Content::Gone, ..*self };
+        std::mem::replace(self, gone)
     }
 
     /// Bound on the largest area that the group can turn towards any point: its own, or half the surface of its box (no
@@ -49,23 +95,58 @@ impl Group {
     pub fn visible_area(&self) -> f64 {
         self.area.min(0.5 * f64::from(self.bounds.surface_area()))
     }
+
+    /// Its surfaces, ascending.
+    pub fn surfaces(&self) -> Vec<u32> {
+        let mut all = Vec::new();
+        self.collect(&mut all);
+        all.sort_unstable();
+        all
+    }
+
+    // No deeper than there were rounds of merging.
+    fn collect(&self, all: &mut Vec<u32>) {
+        match &self.content {
+            Content::Surfaces(own) => all.extend(own),
+            Content::Pair(parts) => parts.iter().for_each(|p| p.collect(all)),
+            Content::Gone => {}
+        }
+    }
+
+    /// The two groups that it was merged from; empty where it was not.
+    pub fn parts(&self) -> &[Group] {
+        match &self.content {
+            Content::Pair(parts) => parts.as_slice(),
+            _ => &[],
+        }
+    }
+
+    /// Whether it was merged from others.
+    pub fn has_parts(&self) -> bool {
+        !self.parts().is_empty()
+    }
+
+    /// What it was merged from; itself where it was not.
+    pub fn split(self) -> Vec<Group> {
+        match self.content {
+            Content::Pair(parts) => Vec::from(parts as Box<[Group]>),
+            _ => vec![self],
+        }
+    }
 }
 
-/// Groups the surfaces `small`; no group has a diagonal above `limit`.
-pub fn find_clusters(mesh: &Mesh, map: &SurfaceMap, small: &[u32], limit: f32) -> Vec<Group> {
-    let mut groups = connected(mesh, map, small, limit);
+/// Groups the surfaces `small` as far as `extent` allows.
+pub fn find_clusters(mesh: &Mesh, map: &SurfaceMap, small: &[u32], extent: Extent) -> Vec<Group> {
+    let mut groups = connected(mesh, map, small, extent.longest);
     for shift in SHIFTS {
         morton_sort(&mut groups, shift);
         for _ in 0..MOST_ROUNDS {
-            if !merge_pairs(&mut groups, limit) {
+            if !merge_pairs(&mut groups, extent) {
                 break;
             }
         }
     }
-    for group in &mut groups {
-        group.surfaces.sort_unstable();
-    }
-    groups.sort_by_key(|g| g.surfaces[0]);
+    groups.sort_by_key(|g| g.first);
     groups
 }
 
@@ -105,7 +186,7 @@ fn connected(mesh: &Mesh, map: &SurfaceMap, small: &[u32], limit: f32) -> Vec<Gr
         if group.bounds.diagonal() <= limit {
             groups.push(group);
         } else {
-            groups.extend(group.surfaces.iter().map(|&s| Group::of(vec![s], &map.surfaces)));
+            groups.extend(group.surfaces().into_iter().map(|s| Group::of(vec![s], &map.surfaces)));
         }
     }
     groups
@@ -118,7 +199,7 @@ fn morton_sort(groups: &mut [Group], shift: f32) {
     let origin = all.min - Vec3::splat(shift * all.size().max_element());
     groups.sort_by_cached_key(|g| {
         let cell = ((g.bounds.centre() - origin) * scale).as_uvec3();
-        (spread(cell.x) | spread(cell.y) << 1 | spread(cell.z) << 2, g.surfaces[0])
+        (spread(cell.x) | spread(cell.y) << 1 | spread(cell.z) << 2, g.first)
     });
 }
 
@@ -132,7 +213,7 @@ fn spread(x: u32) -> u32 {
 }
 
 /// Merges all pairs that are each other's cheapest partner; whether there were any.
-fn merge_pairs(groups: &mut Vec<Group>, limit: f32) -> bool {
+fn merge_pairs(groups: &mut Vec<Group>, extent: Extent) -> bool {
     let partner: Vec<Option<usize>> = (0..groups.len())
         .into_par_iter()
         .with_min_len(256)
@@ -140,7 +221,7 @@ fn merge_pairs(groups: &mut Vec<Group>, limit: f32) -> bool {
             let (first, last) = (i.saturating_sub(WINDOW), (i + WINDOW + 1).min(groups.len()));
             (first..last)
                 .filter(|&j| j != i)
-                .filter_map(|j| merge_cost(&groups[i], &groups[j], limit).map(|cost| (cost, j)))
+                .filter_map(|j| merge_cost(&groups[i], &groups[j], extent).map(|cost| (cost, j)))
                 // Equal costs go to the pair with the lower indices, seen alike from both sides, so that ties can merge.
                 .min_by(|a, b| a.0.total_cmp(&b.0).then((i.min(a.1), i.max(a.1)).cmp(&(i.min(b.1), i.max(b.1)))))
                 .map(|(_, j)| j)
@@ -150,26 +231,22 @@ fn merge_pairs(groups: &mut Vec<Group>, limit: f32) -> bool {
     let before = groups.len();
     for i in 0..before {
         if let Some(j) = mutual(i).filter(|&j| j > i) {
-            let other = std::mem::take(&mut groups[j].surfaces);
-            let (bounds, area) = (groups[j].bounds, groups[j].area);
-            let group = &mut groups[i];
-            group.surfaces.extend(other);
-            group.bounds = group.bounds.union(bounds);
-            group.area += area;
+            groups[i] = Group::pair(groups[i].take(), groups[j].take());
         }
     }
-    groups.retain(|g| !g.surfaces.is_empty());
+    groups.retain(|g| !matches!(g.content, Content::Gone));
     groups.len() < before
 }
 
 /// Surface of the box around both, or `None` where they must not merge.
-fn merge_cost(a: &Group, b: &Group, limit: f32) -> Option<f32> {
+fn merge_cost(a: &Group, b: &Group, extent: Extent) -> Option<f32> {
     let gap = (a.bounds.min - b.bounds.max).max(b.bounds.min - a.bounds.max).max(Vec3::ZERO).length();
-    if gap > neighbour_gap(limit) {
+    if gap > neighbour_gap(extent.compact) {
         return None;
     }
     let both = a.bounds.union(b.bounds);
-    let surface = both.surface_area();
+    let (surface, diagonal) = (both.surface_area(), both.diagonal());
     let fill = 2.0 * (a.area + b.area) / f64::from(surface).max(f64::MIN_POSITIVE);
-    (both.diagonal() <= limit && fill >= LEAST_FILL).then_some(surface)
+    let least = if diagonal <= extent.compact { LEAST_FILL } else { LEAST_FILL_LONG };
+    (diagonal <= extent.longest && fill >= least).then_some(surface)
 }

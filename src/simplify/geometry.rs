@@ -6,7 +6,8 @@ use glam::Vec3;
 
 use super::fit::{face_axes, face_side};
 use super::{Class, Cluster, EquivalentBox, Surface};
-use crate::backend::{HitFilter, Part, PartKind, TriangleSet};
+use crate::backend::{HitFilter, Part, PartKind, RayBackend, RayScene, TriangleSet};
+use crate::error::Result;
 use crate::scene::Scene;
 
 /// Triangles of a box.
@@ -56,8 +57,8 @@ impl SimplifiedGeometry {
         Self::of_triangles(scene, surface_of_triangle, |_| true)
     }
 
-    /// Normal surfaces only.
-    pub(crate) fn normal(scene: &Scene, surfaces: &[Surface], surface_of_triangle: &[u32]) -> Self {
+    /// Normal surfaces only: clusters gone without anything in their place.
+    pub fn normal(scene: &Scene, surfaces: &[Surface], surface_of_triangle: &[u32]) -> Self {
         Self::of_triangles(scene, surface_of_triangle, |s| surfaces[s as usize].class == Class::Normal)
     }
 
@@ -123,9 +124,18 @@ impl SimplifiedGeometry {
         }
     }
 
-    /// For a backend. Add what [`SimplifiedGeometry::filter`] makes of the scene's filter where there is one.
+    /// For a backend, without alpha tests; see [`SimplifiedGeometry::build`].
     pub fn triangle_set(&self) -> TriangleSet<'_> {
         TriangleSet { positions: &self.positions, triangles: &self.triangles, parts: &self.parts, filter: None }
+    }
+
+    /// Builds the acceleration structure, alpha tests included.
+    ///
+    /// # Errors
+    /// When the backend fails.
+    pub fn build(&self, scene: &Arc<Scene>, backend: &dyn RayBackend) -> Result<Box<dyn RayScene>> {
+        let filter = super::scene_filter(scene).map(|f| self.filter(f));
+        backend.build(&TriangleSet { filter, ..self.triangle_set() })
     }
 
     /// The scene's hit filter, for the triangles of this geometry.

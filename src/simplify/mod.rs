@@ -3,9 +3,11 @@
 pub mod classify;
 pub mod cluster;
 pub mod dropped;
+pub mod export;
 pub mod fit;
 pub mod geometry;
 mod replace;
+pub mod report;
 mod support;
 pub mod surfaces;
 #[cfg(test)]
@@ -18,6 +20,9 @@ use std::sync::Arc;
 use glam::{Mat3, Vec3};
 
 pub use geometry::{SimplifiedGeometry, TriangleSource};
+use replace::{Replaced, Replacer};
+
+use dropped::Candidate;
 
 use crate::backend::{HitFilter, PartKind, RayBackend};
 use crate::error::Result;
@@ -35,6 +40,9 @@ pub enum BoxFit {
     Paper1993,
 }
 
+/// Usual value of [`SimplifyParams::longest`]; measured in `docs/simplification.md`.
+pub const LONGEST_CLUSTER: f32 = 3.0;
+
 /// Parameters of [`simplify`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct SimplifyParams {
@@ -46,7 +54,11 @@ pub struct SimplifyParams {
     pub box_fit: BoxFit,
     /// Largest angle between the normals of neighbouring triangles of one surface, radians.
     pub crease_angle: f32,
-    /// Face patches along each edge of a box face.
+    /// Largest diagonal of a cluster in units of `r_thresh`, 1..=infinity. Clusters up to 1 are always harmless: a point
+    /// inside misses nothing of them. Longer ones (a row of books, the frame of a chair) are kept only where hardly any light
+    /// that leaves their surfaces meets them again beyond `r_thresh`, which is measured.
+    pub longest: f32,
+    /// Patches along each edge of a box face.
     pub face_resolution: u32,
     /// Seed of the fitting rays.
     pub seed: u32,
@@ -139,6 +151,11 @@ pub struct FitResidual {
     pub intercepted: f32,
     /// Standard error of `intercepted`; infinite when no line hit the cluster, so that nothing is known.
     pub intercepted_error: f32,
+    /// The same by direction: sum over the directions closest to each of the three axes of what the box intercepts too much
+    /// or too little, over all that the cluster intercepts.
+    pub directional: f32,
+    /// Share of the light leaving the cluster's surfaces that meets them again beyond `r_thresh`.
+    pub hidden: f32,
     /// Mean reflected colour of the box minus that of the cluster.
     pub reflected: Vec3,
 }
@@ -180,27 +197,44 @@ pub fn simplify(
     let mut warnings = Vec::new();
 
     let mut surfaces = map.surfaces.clone();
-    let mut groups = Vec::new();
+    let mut replaced = Replaced::default();
     if is_used(scene, params.r_thresh) {
-        let limit = classify::size_limit(scene, params.r_thresh);
-        let small = classify::find_small(scene, &surfaces, a_thresh, limit);
-        groups = cluster::find_clusters(&scene.mesh, &map, &small.compact, limit);
-        let kept_long = drop_isolated(&mut surfaces, &mut groups, &small, a_thresh, params.r_thresh);
-        if kept_long > 0 {
-            warnings.push(format!(
-                "{kept_long} surfaces have less area than A_thresh = {a_thresh:.3e} but are longer than {limit:.3e} and stay normal"
-            ));
+        let extent = classify::extent(scene, params.r_thresh, params.longest);
+        let small = classify::find_small(scene, &surfaces, a_thresh, extent);
+        let mut groups = cluster::find_clusters(&scene.mesh, &map, &small.clusterable, extent);
+        let mut dropper = dropped::Dropper::new(a_thresh, params.r_thresh);
+        drop_isolated(&mut dropper, &mut surfaces, &mut groups, &small.long_isolated, extent);
+        // Nothing that may become part of a box can carry one.
+        let mut carriers = surfaces.clone();
+        for s in groups.iter().flat_map(cluster::Group::surfaces) {
+            carriers[s as usize].class = Class::Complex { cluster: None };
         }
-        groups.retain(|g| worth_a_box(g, &surfaces));
-        for (cluster, group) in (0u32..).zip(&groups) {
-            for &s in &group.surfaces {
+        replaced = Replacer {
+            scene,
+            backend,
+            params,
+            compact: extent.compact,
+            uncoverable: classify::uncoverable(scene),
+            surface_of_triangle: &map.of_triangle,
+            normal: &SimplifiedGeometry::normal(scene, &carriers, &map.of_triangle),
+        }
+        .replace(groups, progress)?;
+        drop_small_boxes(&mut dropper, &mut surfaces, &mut replaced.clusters, extent);
+        for (cluster, c) in (0u32..).zip(&replaced.clusters) {
+            for &s in &c.surfaces {
                 surfaces[s as usize].class = Class::Complex { cluster: Some(cluster) };
             }
+        }
+        let too_long = drop_strips(&mut dropper, scene, &mut surfaces, &map.of_triangle, extent);
+        if too_long > 0 {
+            warnings.push(format!(
+                "{too_long} surfaces have less area than A_thresh = {a_thresh:.3e} but are longer than {:.3e} and stay normal",
+                extent.compact
+            ));
         }
     }
 
     let mut geometry = SimplifiedGeometry::normal(scene, &surfaces, &map.of_triangle);
-    let replaced = replace::replace(scene, backend, params, &groups, &map.of_triangle, &geometry, progress)?;
     warnings.extend(replaced.warnings);
     geometry.add_boxes(&replaced.clusters);
     Ok(Simplified {
@@ -221,50 +255,97 @@ fn is_used(scene: &Scene, r_thresh: f32) -> bool {
     r_thresh > 0.0 && r_thresh <= 2.0 * scene.mesh.bounds.diagonal()
 }
 
-/// Whether a box is simpler than what it replaces. A few quads are not worth one: they stay as they are, which is exact.
-fn worth_a_box(group: &cluster::Group, surfaces: &[Surface]) -> bool {
-    group.surfaces.iter().map(|&s| surfaces[s as usize].triangles).sum::<u32>() > geometry::BOX_TRIANGLES
-}
+/// What became of surfaces that are dropped.
+const GONE: Class = Class::Complex { cluster: None };
 
-/// Takes the groups that are dropped out of `groups` and marks their surfaces. Returns how many surfaces had to stay normal
-/// because they are too long for a cluster.
+/// Takes the groups that are dropped out of `groups` and marks their surfaces. Long groups touch something else and may be
+/// part of an enclosure: they stay.
 fn drop_isolated(
+    dropper: &mut dropped::Dropper,
     surfaces: &mut [Surface],
     groups: &mut Vec<cluster::Group>,
-    small: &classify::Small,
-    a_thresh: f64,
-    r_thresh: f32,
-) -> usize {
-    let of_group = |g: &cluster::Group| dropped::Candidate { centre: g.bounds.centre(), area: g.visible_area() };
+    long_isolated: &[u32],
+    extent: cluster::Extent,
+) {
+    let of_group = |g: &cluster::Group| {
+        let compact = g.bounds.diagonal() <= extent.compact;
+        Candidate::compact(g.bounds.centre(), if compact { g.visible_area() } else { f64::INFINITY })
+    };
     let of_surface = |&s: &u32| {
         let surface: &Surface = &surfaces[s as usize];
-        dropped::Candidate { centre: surface.bounds.centre(), area: surface.area }
+        Candidate::compact(surface.bounds.centre(), surface.area)
     };
-    let candidates: Vec<_> = groups.iter().map(of_group).chain(small.long_isolated.iter().map(of_surface)).collect();
-    let is_dropped = dropped::choose_dropped(&candidates, a_thresh, r_thresh);
+    let candidates: Vec<_> = groups.iter().map(of_group).chain(long_isolated.iter().map(of_surface)).collect();
+    let is_dropped = dropper.choose(&candidates);
     let (of_groups, of_long) = is_dropped.split_at(groups.len());
-    let gone = Class::Complex { cluster: None };
-    let mut kept = small.long_kept;
-    for (&s, &dropped) in small.long_isolated.iter().zip(of_long) {
-        if dropped {
-            surfaces[s as usize].class = gone;
-        } else {
-            kept += 1;
-        }
+    for (&s, _) in long_isolated.iter().zip(of_long).filter(|(_, dropped)| **dropped) {
+        surfaces[s as usize].class = GONE;
     }
     let mut of_groups = of_groups.iter();
     groups.retain(|group| {
         let dropped = of_groups.next().copied().unwrap_or(false);
         if dropped {
-            group.surfaces.iter().for_each(|&s| surfaces[s as usize].class = gone);
+            group.surfaces().into_iter().for_each(|s| surfaces[s as usize].class = GONE);
         }
         !dropped
     });
-    kept
+}
+
+/// Drops long clusters that come out so sparse that their boxes are below the threshold, as the paper does. Compact ones have
+/// been decided on before they were fitted.
+fn drop_small_boxes(
+    dropper: &mut dropped::Dropper,
+    surfaces: &mut [Surface],
+    clusters: &mut Vec<Cluster>,
+    extent: cluster::Extent,
+) {
+    let r_thresh = dropper.r_thresh;
+    let candidates = clusters.iter().map(|c| {
+        let long = c.bounds.diagonal() > extent.compact;
+        // No direction shows more of a box than three of its faces.
+        let area = fit::half_surface(2.0 * c.equivalent_box.half);
+        Candidate::spread(c.equivalent_box.bounds(), if long { area } else { f64::INFINITY }, r_thresh)
+    });
+    let mut is_dropped = dropper.choose(&candidates.collect::<Vec<_>>()).into_iter();
+    clusters.retain(|c| {
+        let dropped = is_dropped.next().unwrap_or(false);
+        if dropped {
+            c.surfaces.iter().for_each(|&s| surfaces[s as usize].class = GONE);
+        }
+        !dropped
+    });
+}
+
+/// Drops strips that no box replaces, as far as there is room left for them. Returns how many surfaces have little area and
+/// stay normal because they are too long.
+fn drop_strips(
+    dropper: &mut dropped::Dropper,
+    scene: &Scene,
+    surfaces: &mut [Surface],
+    surface_of_triangle: &[u32],
+    extent: cluster::Extent,
+) -> usize {
+    let (a_thresh, r_thresh) = (dropper.a_thresh, dropper.r_thresh);
+    let is_left = |s: &Surface| {
+        s.class == Class::Normal && s.bounds.diagonal() > extent.compact && classify::is_small(scene, s, a_thresh)
+    };
+    let is_strip = |s: &Surface| is_left(s) && dropped::is_strip(s.area, s.bounds.diagonal(), r_thresh);
+    let strips: Vec<u32> = (0u32..).zip(surfaces.iter()).filter(|(_, s)| is_strip(s)).map(|(i, _)| i).collect();
+    let mut triangles = vec![Vec::new(); strips.len()];
+    for (t, s) in (0u32..).zip(surface_of_triangle) {
+        if let Ok(i) = strips.binary_search(s) {
+            triangles[i].push(t);
+        }
+    }
+    let candidates: Vec<_> = triangles.iter().map(|t| Candidate::strip(&scene.mesh, t, r_thresh)).collect();
+    for (&s, _) in strips.iter().zip(dropper.choose(&candidates)).filter(|(_, dropped)| *dropped) {
+        surfaces[s as usize].class = GONE;
+    }
+    surfaces.iter().filter(|s| is_left(s)).count()
 }
 
 /// The scene's filter for alpha-tested triangles, where it has any.
-fn scene_filter(scene: &Arc<Scene>) -> Option<Arc<dyn HitFilter>> {
+pub(crate) fn scene_filter(scene: &Arc<Scene>) -> Option<Arc<dyn HitFilter>> {
     let any = scene.mesh.objects.iter().any(|o| o.kind == PartKind::Filtered);
     any.then(|| Arc::new(AlphaFilter::new(scene.clone())) as Arc<dyn HitFilter>)
 }

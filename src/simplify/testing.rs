@@ -58,6 +58,7 @@ pub(crate) fn params(r_thresh: f32, beta: f32) -> SimplifyParams {
         beta,
         box_fit: super::BoxFit::Flux,
         crease_angle: 30f32.to_radians(),
+        longest: 3.0,
         face_resolution: 2,
         seed: 1,
     }

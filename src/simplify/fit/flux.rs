@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 use glam::{DVec3, Mat3, Vec3};
 
-use super::lines::{Buffers, Line};
+use super::lines::{Buffers, FirstBounce, Line, LineEnd};
 use super::{LEAST_THICKNESS, Probe, Stage, fill_patches, frame_along, half_surface, patch_index};
 use crate::backend::RayBackend;
 use crate::error::Result;
@@ -38,6 +38,10 @@ pub(crate) struct LineTally {
     pub(crate) escaped: DVec3,
     /// For each patch of the bounding box: hits, and their summed escape weights.
     pub(crate) patches: [Vec<(u32, Vec3)>; 6],
+    /// Hits whose light went on from the surface that was hit ...
+    pub(crate) reflected: u32,
+    /// ... and met the cluster again beyond `r_thresh`.
+    pub(crate) hidden: u32,
     /// Rays traced.
     pub(crate) rays: u64,
 }
@@ -52,8 +56,10 @@ impl LineTally {
             let next = (2 * tally.lines).max(LEAST_LINES).min(most);
             while tally.lines < next {
                 let end = (tally.lines + BATCH).min(next);
-                let rays = probe.follow_lines(tally.lines..end, stream, buffers, |line, escaped| {
-                    let Some(escaped) = escaped else { return };
+                let rays = probe.follow_lines(tally.lines..end, stream, buffers, |line, end| {
+                    let LineEnd::Hit { escaped, first } = end else { return };
+                    tally.reflected += u32::from(first != FirstBounce::Absorbed);
+                    tally.hidden += u32::from(first == FirstBounce::Hidden);
                     tally.hits[dominant_axis(line)] += 1;
                     tally.escaped += escaped.as_dvec3();
                     let patch = &mut tally.patches[line.face][patch_index(line.at.x, line.at.y, resolution)];
@@ -80,6 +86,11 @@ impl LineTally {
     pub(crate) fn relative_error(&self) -> f64 {
         let hits = f64::from(self.hit_count());
         ((1.0 - self.hit_share()) / hits).sqrt()
+    }
+
+    /// Share of the light leaving the cluster's surfaces that meets them again beyond `r_thresh`.
+    pub(crate) fn hidden_share(&self) -> f64 {
+        f64::from(self.hidden) / f64::from(self.reflected.max(1))
     }
 
     /// Mean escape albedo over all hits.
@@ -136,7 +147,7 @@ pub fn fit_flux(
     let frame = frame_along(scene, triangles, axes);
     let stage = Stage::new(scene, &[(triangles, frame)]);
     let rays = stage.build(scene, backend)?;
-    let probe = Probe::new(scene, &stage, rays.as_ref(), 0);
+    let probe = Probe::new(scene, &stage, rays.as_ref(), 0, &frame, f32::INFINITY);
     let tally = LineTally::measure(&probe, resolution, lines, seed, &mut Buffers::default());
     Ok(FluxFit::new(2.0 * frame.half, &tally))
 }
@@ -187,6 +198,15 @@ fn box_edges(size: Vec3, tally: &LineTally) -> Vec3 {
     );
     let thinnest = LEAST_THICKNESS * size.max_element();
     edges_with_surface(wanted, size.max(Vec3::splat(thinnest)), thinnest, target)
+}
+
+/// What [`LineTally::hits`] would be on average, over the number of lines, of a box with edges `edges` inside a bounding box
+/// with edges `size`.
+pub(crate) fn box_hit_shares(edges: Vec3, size: Vec3) -> DVec3 {
+    let along = integral_along();
+    let across = 0.5 * (2.0 * PI - along);
+    let faces = DVec3::from_array(std::array::from_fn(|axis| face_area(edges, axis)));
+    ((along - across) * faces + across * faces.element_sum()) / (2.0 * PI * half_surface(size))
 }
 
 /// Face areas `b` of the box whose projected area `sum b_i |w_i|` agrees with the cluster's in the mean over the directions

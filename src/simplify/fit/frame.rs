@@ -38,7 +38,7 @@ impl Frame {
     }
 
     /// The axes that suit the cluster: the upright ones unless others enclose it clearly tighter with a diagonal of at most
-    /// `limit`. Tried are the modelling axes of each object in it, turns about the vertical, and turns about the direction in
+    /// `limit` or what the upright ones have. Tried are the modelling axes of each object in it, turns about the vertical, and turns about the direction in
     /// which it is flattest.
     pub fn suited(mesh: &Mesh, triangles: &[u32], limit: f32) -> Self {
         let corners = || triangles.iter().flat_map(|&t| mesh.corners(t));
@@ -76,11 +76,18 @@ impl Frame {
             }
         }
         let turned = Frame::around(corners(), best.1);
-        if turned.surface() < WORTHWHILE * upright.surface() && 2.0 * turned.half.length() <= limit {
+        if turned.surface() < WORTHWHILE * upright.surface()
+            && turned.half.length() <= upright.half.length().max(0.5 * limit)
+        {
             turned
         } else {
             upright
         }
+    }
+
+    /// From scene units to those of the largest edge.
+    pub(crate) fn scale(&self) -> f32 {
+        0.5 / self.half.max_element()
     }
 
     fn surface(&self) -> f32 {

@@ -39,7 +39,7 @@ pub(crate) struct Buffers {
     rays: Vec<Ray>,
     hits: Vec<Hit>,
     paths: Vec<Path>,
-    albedos: Vec<Option<Vec3>>,
+    ends: Vec<LineEnd>,
 }
 
 struct Path {
@@ -47,18 +47,42 @@ struct Path {
     weight: Vec3,
 }
 
+/// What became of a line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum LineEnd {
+    /// It met nothing.
+    Through,
+    /// It hit the cluster.
+    Hit {
+        /// The share of its light that leaves the cluster again; the escape albedo is its mean over hits.
+        escaped: Vec3,
+        /// Where its light went from the first surface.
+        first: FirstBounce,
+    },
+}
+
+/// Where light goes from the first surface that a line hits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum FirstBounce {
+    /// Nowhere, the surface is black.
+    Absorbed,
+    /// Out of the cluster, or to where a gather ray from there would see it in the detailed scene.
+    Seen,
+    /// To another part of the cluster farther than the near part of a gather ray reaches: from inside the box, the simplified
+    /// scene does not show it.
+    Hidden,
+}
+
 impl Probe<'_> {
-    /// Follows the lines with the given numbers (`0..65536`) and puts each to `visit`, with the share of its light that
-    /// leaves the cluster again (the escape albedo is the mean over hits), or `None` when it hit nothing. Returns the number
-    /// of rays traced. `stream` keeps sets of lines independent.
+    /// Follows the lines with the given numbers (`0..65536`) and puts each to `visit`. Returns the number of rays traced. `stream` keeps sets of lines independent.
     pub(crate) fn follow_lines(
         &self,
         numbers: Range<u32>,
         stream: u32,
         buffers: &mut Buffers,
-        mut visit: impl FnMut(&Line, Option<Vec3>),
+        mut visit: impl FnMut(&Line, LineEnd),
     ) -> u64 {
-        let Buffers { lines, rays, hits, paths, albedos } = buffers;
+        let Buffers { lines, rays, hits, paths, ends } = buffers;
         lines.clear();
         rays.clear();
         for index in numbers {
@@ -66,8 +90,8 @@ impl Probe<'_> {
             rays.push(self.ray(origin - MARGIN * line.direction, line.direction));
             lines.push(line);
         }
-        albedos.clear();
-        albedos.resize(lines.len(), None);
+        ends.clear();
+        ends.resize(lines.len(), LineEnd::Through);
         paths.clear();
         paths.extend((0..lines.len() as u32).map(|line| Path { line, weight: Vec3::ONE }));
 
@@ -81,14 +105,21 @@ impl Probe<'_> {
             for i in 0..paths.len() {
                 let (line, hit) = (paths[i].line as usize, hits[i]);
                 if !hit.is_hit() {
-                    if bounce > 0 {
-                        albedos[line] = Some(paths[i].weight);
+                    if let LineEnd::Hit { escaped, .. } = &mut ends[line] {
+                        *escaped = paths[i].weight;
                     }
                     continue;
                 }
-                albedos[line] = Some(Vec3::ZERO);
                 let mut weight = paths[i].weight * self.reflectance(hit.triangle, hit.u, hit.v);
-                let [u, v, survive, _] = sampling::sobol(lines[line].index, 1 + bounce.min(62), stream);
+                let [u, v, survive, length] = sampling::sobol(lines[line].index, 1 + bounce.min(62), stream);
+                match (bounce, &mut ends[line]) {
+                    (0, end) => *end = LineEnd::Hit { escaped: Vec3::ZERO, first: FirstBounce::Absorbed },
+                    // Near parts of gather rays have these lengths.
+                    (1, LineEnd::Hit { first, .. }) if hit.t > self.reach * (0.5 + length) => {
+                        *first = FirstBounce::Hidden;
+                    }
+                    _ => {}
+                }
                 if bounce >= ROULETTE_AFTER {
                     let chance = weight.max_element().min(1.0);
                     if survive >= chance {
@@ -97,6 +128,11 @@ impl Probe<'_> {
                     weight /= chance;
                 }
                 if weight.max_element() > 0.0 {
+                    if bounce == 0
+                        && let LineEnd::Hit { first, .. } = &mut ends[line]
+                    {
+                        *first = FirstBounce::Seen;
+                    }
                     rays[alive] = self.bounced(&rays[i], &hit, Vec2::new(u, v));
                     paths[alive] = Path { line: line as u32, weight };
                     alive += 1;
@@ -108,8 +144,8 @@ impl Probe<'_> {
                 break;
             }
         }
-        for (line, albedo) in lines.iter().zip(albedos.iter()) {
-            visit(line, *albedo);
+        for (line, end) in lines.iter().zip(ends.iter()) {
+            visit(line, *end);
         }
         traced
     }

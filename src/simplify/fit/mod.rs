@@ -66,7 +66,7 @@ impl Stage {
             let start = stage.triangles.len() as u32;
             for (i, (triangles, frame)) in clusters.iter().enumerate() {
                 let cell = Vec3::new((i % side) as f32, (i / side % side) as f32, (i / side / side) as f32) - middle;
-                let (to_local, scale) = (frame.axes.transpose(), 0.5 / frame.half.max_element());
+                let (to_local, scale) = (frame.axes.transpose(), frame.scale());
                 for &t in triangles.iter() {
                     let object = scene.mesh.object(t);
                     if (object.kind == PartKind::Filtered) != (kind == PartKind::Filtered) {
@@ -111,11 +111,20 @@ pub(crate) struct Probe<'a> {
     pub(crate) stage: &'a Stage,
     pub(crate) rays: &'a dyn RayScene,
     pub(crate) bounds: Aabb,
+    /// `r_thresh` at the stage's scale.
+    pub(crate) reach: f32,
 }
 
 impl<'a> Probe<'a> {
-    pub(crate) fn new(scene: &'a Scene, stage: &'a Stage, rays: &'a dyn RayScene, cluster: usize) -> Self {
-        Probe { scene, stage, rays, bounds: stage.bounds[cluster] }
+    pub(crate) fn new(
+        scene: &'a Scene,
+        stage: &'a Stage,
+        rays: &'a dyn RayScene,
+        cluster: usize,
+        frame: &Frame,
+        r_thresh: f32,
+    ) -> Self {
+        Probe { scene, stage, rays, bounds: stage.bounds[cluster], reach: r_thresh * frame.scale() }
     }
 
     /// The ray from `origin` to where it has left the cluster.

@@ -106,7 +106,7 @@ pub fn fit_paper1993(
     let frame = frame_along(scene, triangles, axes);
     let stage = Stage::new(scene, &[(triangles, frame)]);
     let rays = stage.build(scene, backend)?;
-    let probe = Probe::new(scene, &stage, rays.as_ref(), 0);
+    let probe = Probe::new(scene, &stage, rays.as_ref(), 0, &frame, f32::INFINITY);
     Ok(PaperFit::measure(&probe, 2.0 * frame.half, resolution, rays_along, seed))
 }
 

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::flux::{LineTally, mean_reflectance};
+use super::flux::{LineTally, box_hit_shares, mean_reflectance};
 use super::half_surface;
 use crate::simplify::FitResidual;
 
@@ -18,10 +18,14 @@ impl FitResidual {
             return FitResidual { intercepted_error: f32::INFINITY, ..FitResidual::default() };
         }
         let ratio = of_box / of_cluster;
+        let shares = box_hit_shares(edges, size);
+        let misfit = |axis: usize| (shares[axis] - f64::from(fresh.hits[axis]) / f64::from(fresh.lines)).abs();
         FitResidual {
             hit_share: of_cluster as f32,
             intercepted: (ratio - 1.0) as f32,
             intercepted_error: (ratio * fresh.relative_error()) as f32,
+            directional: ((misfit(0) + misfit(1) + misfit(2)) / of_cluster) as f32,
+            hidden: fresh.hidden_share() as f32,
             reflected: mean_reflectance(reflectance, edges) - fresh.albedo(),
         }
     }

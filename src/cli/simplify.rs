@@ -1,0 +1,196 @@
+//! `gsii simplify`: the simplified scene, to be looked at and measured.
+
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Instant;
+
+use clap::Args;
+
+use super::options::{LengthOrAuto, SceneOptions, Talk, load};
+use crate::error::{Error, Result};
+use crate::pipeline::{BackendKind, Method, Prepared, Settings, Stats, choose_camera, simplify_only};
+use crate::radiosity::{self, Solution};
+use crate::scene::Scene;
+use crate::simplify::{BoxFit, Class, LONGEST_CLUSTER, Simplified, SimplifiedGeometry, export, report};
+
+/// Options of `gsii simplify`.
+#[derive(Args, Debug)]
+pub struct Options {
+    #[command(flatten)]
+    scene: SceneOptions,
+    /// Binary glTF file to write the simplified scene to
+    #[arg(short, long, value_name = "FILE.glb")]
+    output: Option<PathBuf>,
+    /// Table of all clusters, as CSV or JSON by extension
+    #[arg(long, value_name = "FILE.csv|.json")]
+    report: Option<PathBuf>,
+    /// Solve radiosity and write radiosities as colours, instead of reflectances
+    #[arg(long, requires = "output")]
+    radiosity: bool,
+    /// Distance beyond which the simplified scene is used (scene units)
+    #[arg(long, value_name = "LENGTH|auto", default_value = "auto", help_heading = "Method")]
+    r_thresh: LengthOrAuto,
+    /// Share of the hemisphere that one dropped surface may fill, 0..1 [default: 1/2pi]
+    #[arg(long, value_name = "X", help_heading = "Method")]
+    beta: Option<f32>,
+    /// How boxes are fitted to clusters
+    #[arg(long = "box", value_enum, default_value_t, help_heading = "Method")]
+    box_fit: BoxFit,
+    /// Largest diagonal of a cluster in units of r_thresh; 1 allows none that could hide anything
+    #[arg(long, value_name = "X", default_value_t = LONGEST_CLUSTER, help_heading = "Method")]
+    longest_cluster: f32,
+    /// Edge length of radiosity patches (scene units)
+    #[arg(long, value_name = "LENGTH|auto", default_value = "auto", help_heading = "Method")]
+    patch_size: LengthOrAuto,
+    /// Seed: the same seed gives the same result, bit for bit
+    #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Run")]
+    seed: u32,
+    /// Ray-tracing library
+    #[arg(long, value_enum, default_value_t, help_heading = "Run")]
+    backend: BackendKind,
+    #[command(flatten)]
+    talk: Talk,
+}
+
+impl Options {
+    fn settings(&self) -> Settings {
+        let default = Settings::default();
+        Settings {
+            method: Method::Gsii,
+            r_thresh: self.r_thresh.0,
+            beta: self.beta.unwrap_or(default.beta),
+            box_fit: self.box_fit,
+            longest_cluster: self.longest_cluster,
+            patch_size: self.patch_size.0,
+            backend: self.backend,
+            seed: self.seed,
+            ..default
+        }
+    }
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Bad options, bad input, a failing library, a file that cannot be written.
+pub fn run(options: &Options) -> Result<ExitCode> {
+    let table = options.report.as_deref().map(table_format).transpose()?;
+    let progress = options.talk.progress();
+    let mut stats = Stats::new();
+    let scene = load(&options.scene, &mut stats)?;
+    let camera = choose_camera(&scene, options.scene.camera.as_deref())?.clone();
+    let start = Instant::now();
+    let (simplified, settings, solution) = if options.radiosity {
+        let prepared = Prepared::new(scene.clone(), &camera, options.settings(), &progress, &mut stats)?;
+        let far = prepared.far.and_then(|far| Some((far.simplified?, far.solution)));
+        let Some((simplified, solution)) = far else {
+            return Err(Error::Usage("--radiosity needs an r_thresh above 0 and below infinity".to_owned()));
+        };
+        (simplified, prepared.settings, Some(solution))
+    } else {
+        let (simplified, settings) = simplify_only(&scene, &camera, options.settings(), &progress, &mut stats)?;
+        (simplified, settings, None)
+    };
+    for warning in &simplified.warnings {
+        log::warn!("{warning}");
+    }
+    if let Some(path) = &options.output {
+        write_file(path, |out| export::write(&scene, &simplified, solution.as_ref(), out))?;
+    }
+    if let (Some(path), Some(format)) = (&options.report, table) {
+        let rows = report::rows(&simplified);
+        write_file(path, |out| match format {
+            Table::Csv => report::write_csv(&rows, out),
+            Table::Json => report::write_json(&rows, out),
+        })?;
+    }
+    print_table(&scene, &simplified, &settings, solution.as_ref(), start.elapsed().as_secs_f64())?;
+    Ok(ExitCode::SUCCESS)
+}
+
+#[derive(Clone, Copy)]
+enum Table {
+    Csv,
+    Json,
+}
+
+fn table_format(path: &Path) -> Result<Table> {
+    match path.extension().and_then(|e| e.to_str()) {
+        Some("csv") => Ok(Table::Csv),
+        Some("json") => Ok(Table::Json),
+        _ => Err(Error::Usage(format!("--report {}: the name must end in .csv or .json", path.display()))),
+    }
+}
+
+/// The paper's comparison of both environments, and how well the boxes fit.
+fn print_table(
+    scene: &Scene,
+    simplified: &Simplified,
+    settings: &Settings,
+    solution: Option<&Solution>,
+    seconds: f64,
+) -> Result<()> {
+    let complete = SimplifiedGeometry::complete(scene, &simplified.surface_of_triangle);
+    let params = settings.radiosity_params();
+    let patches_complete = radiosity::count_patches(&complete, &[], &params)?;
+    let patches = match solution {
+        Some(solution) => solution.patches,
+        None => radiosity::count_patches(&simplified.geometry, &simplified.clusters, &params)?,
+    };
+    let count = |f: &dyn Fn(Class) -> bool| simplified.surfaces.iter().filter(|s| f(s.class)).count();
+    let normal = count(&|c| c == Class::Normal);
+    let dropped = count(&Class::is_isolated);
+    let all = simplified.surfaces.len();
+    let clusters = &simplified.clusters;
+    println!(
+        "{}: r_thresh {:.4}, beta {:.4}, A_thresh {:.5}, patches of {:.4}",
+        scene.name,
+        settings.r_thresh(),
+        settings.beta,
+        simplified.a_thresh,
+        settings.patch_size.unwrap_or(f32::INFINITY)
+    );
+    println!("                    surfaces   patches  triangles");
+    println!("normal + complex  {all:>10} {patches_complete:>9} {:>10}", complete.triangles.len());
+    let geometry = &simplified.geometry;
+    println!("normal + simple   {:>10} {patches:>9} {:>10}", geometry.surfaces, geometry.triangles.len());
+    let share = |a: usize, b: usize| 100.0 * a as f64 / b.max(1) as f64;
+    println!(
+        "                  {:>9.2}% {:>8.2}% {:>9.2}%",
+        share(geometry.surfaces as usize, all),
+        share(patches, patches_complete),
+        share(geometry.triangles.len(), complete.triangles.len())
+    );
+    println!(
+        "{normal} normal, {} in {} clusters, {dropped} dropped; {seconds:.2} s, {} rays",
+        all - normal - dropped,
+        clusters.len(),
+        simplified.rays
+    );
+    if !clusters.is_empty() {
+        let n = clusters.len() as f32;
+        let mean =
+            |f: &dyn Fn(&crate::simplify::FitResidual) -> f32| clusters.iter().map(|c| f(&c.residual)).sum::<f32>() / n;
+        println!(
+            "boxes on fresh rays: mean |intercepted - 1| {:.4}, by direction {:.4}, mean |reflected colour| {:.4}, hidden {:.4}",
+            mean(&|r| r.intercepted.abs()),
+            mean(&|r| r.directional),
+            mean(&|r| r.reflected.abs().element_sum() / 3.0),
+            mean(&|r| r.hidden)
+        );
+    }
+    Ok(())
+}
+
+/// Writes a file under a temporary name and renames it when it is complete.
+fn write_file(path: &Path, content: impl FnOnce(&mut BufWriter<&std::fs::File>) -> std::io::Result<()>) -> Result<()> {
+    let failed = |error: std::io::Error| Error::Output { path: path.to_owned(), reason: error.to_string() };
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let file = tempfile::NamedTempFile::new_in(folder).map_err(failed)?;
+    let mut out = BufWriter::new(file.as_file());
+    content(&mut out).and_then(|()| out.flush()).map_err(failed)?;
+    drop(out);
+    file.persist(path).map_err(|e| failed(e.error))?;
+    Ok(())
+}
