@@ -371,6 +371,18 @@ impl Part {
 
 /// Radiance that each camera sees in its one pixel, over seeds of both the radiosity solution and the image.
 pub fn radiance(scene: &Arc<Scene>, settings: &Settings, cameras: &[Camera], trials: u32, part: Part) -> Vec<Estimate> {
+    radiance_of(scene, settings, cameras, [1, 1], trials, part)
+}
+
+/// The same with a mean over several pixels, each with trials of its own.
+pub fn radiance_of(
+    scene: &Arc<Scene>,
+    settings: &Settings,
+    cameras: &[Camera],
+    size: [u32; 2],
+    trials: u32,
+    part: Part,
+) -> Vec<Estimate> {
     let radiosity_is_used = settings.method != Method::Mcpt;
     let seeds: Vec<u32> = (0..SEEDS).map(|s| hash_all(&[0xca5e, s])).collect();
     let solutions = if radiosity_is_used { SEEDS as usize } else { 1 };
@@ -380,8 +392,8 @@ pub fn radiance(scene: &Arc<Scene>, settings: &Settings, cameras: &[Camera], tri
     let values: Vec<f64> = jobs
         .par_iter()
         .map(|&(s, c)| {
-            let film = image(&prepared[s % solutions], &cameras[c], [1, 1], trials, seeds[s]);
-            part.of(film.pixels().next().unwrap())[0]
+            let film = image(&prepared[s % solutions], &cameras[c], size, trials, seeds[s]);
+            film.pixels().map(|p| part.of(p)[0]).sum::<f64>() / f64::from(size[0] * size[1])
         })
         .collect();
     transposed(&values.chunks(cameras.len()).map(<[f64]>::to_vec).collect::<Vec<_>>())

@@ -4,9 +4,15 @@
 //! `cargo test --release --test cases -- FF RAD-01` runs the cases whose names contain one of the words. With
 //! `GSII_WRITE_ACCURACY=docs/accuracy.md` a complete run writes the table.
 
+mod cie;
+mod direct_light;
 mod form_factors;
+mod gsii;
+mod hard;
 mod kit;
+mod radiosity;
 mod report;
+mod specular;
 
 use std::time::Instant;
 
@@ -19,7 +25,9 @@ type Recipe = fn(&Case, &mut Outcome<'_>);
 const KNOWN: &[(&str, &str)] = &[];
 
 fn recipe(id: &str) -> Option<Recipe> {
-    let all = [form_factors::RECIPES];
+    let all =
+        [form_factors::RECIPES, radiosity::RECIPES, direct_light::RECIPES, cie::RECIPES, specular::RECIPES,
+        gsii::RECIPES, hard::RECIPES];
     all.iter().flat_map(|r| r.iter()).find(|(name, _)| *name == id).map(|(_, recipe)| *recipe)
 }
 
