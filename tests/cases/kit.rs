@@ -383,20 +383,34 @@ pub fn radiance_of(
     trials: u32,
     part: Part,
 ) -> Vec<Estimate> {
+    all_parts(scene, settings, cameras, size, trials).into_iter().map(|parts| parts[part as usize]).collect()
+}
+
+/// The same for each [`Part`].
+pub fn all_parts(
+    scene: &Arc<Scene>,
+    settings: &Settings,
+    cameras: &[Camera],
+    size: [u32; 2],
+    trials: u32,
+) -> Vec<[Estimate; 3]> {
     let radiosity_is_used = settings.method != Method::Mcpt;
     let seeds: Vec<u32> = (0..SEEDS).map(|s| hash_all(&[0xca5e, s])).collect();
     let solutions = if radiosity_is_used { SEEDS as usize } else { 1 };
     let prepared: Vec<Prepared> =
         seeds[..solutions].iter().map(|&seed| prepare(scene, Settings { seed, ..settings.clone() }).unwrap()).collect();
     let jobs: Vec<(usize, usize)> = (0..seeds.len()).flat_map(|s| (0..cameras.len()).map(move |c| (s, c))).collect();
-    let values: Vec<f64> = jobs
+    let values: Vec<[f64; 3]> = jobs
         .par_iter()
         .map(|&(s, c)| {
             let film = image(&prepared[s % solutions], &cameras[c], size, trials, seeds[s]);
-            film.pixels().map(|p| part.of(p)[0]).sum::<f64>() / f64::from(size[0] * size[1])
+            [Part::Direct, Part::Indirect, Part::All].map(|part| {
+                film.pixels().map(|p| part.of(p)[0]).sum::<f64>() / f64::from(size[0] * size[1])
+            })
         })
         .collect();
-    transposed(&values.chunks(cameras.len()).map(<[f64]>::to_vec).collect::<Vec<_>>())
+    let by_seed: Vec<Vec<f64>> = values.chunks(cameras.len()).map(|v| v.concat()).collect();
+    transposed(&by_seed).chunks(3).map(|p| [p[0], p[1], p[2]]).collect()
 }
 
 /// A small receiver of reflectance 1/2 at a point; [`irradiance`] turns what a camera sees of it into irradiance.
