@@ -226,7 +226,7 @@ fn spec_006_mirror_ball(case: &Case, out: &mut Outcome<'_>) {
     };
     let (e, inside) = (case.values("/E_reflected"), case.values("/flux_inside"));
     // A floor of its own for the far radius: the smaller the floor, the more of the light meets the ball.
-    for (first, last, patch_size) in [(0, 6, 0.012), (6, 7, 0.04)] {
+    for (first, last, patch_size) in [(0, 6, 0.02), (6, 7, 0.05)] {
         let rings = radii[first..last].iter().flat_map(|r| [(r * (1.0 - WIDTH)).max(0.5), *r, r * (1.0 + WIDTH)]);
         let mut edges: Vec<f64> = [0.0, 0.5].into_iter().chain(rings).collect();
         edges.sort_by(f64::total_cmp);
@@ -267,7 +267,7 @@ fn spec_007_invisible_in_a_furnace(_: &Case, out: &mut Outcome<'_>) {
             look_at(&scene, v(0.1, 0.2, 1.0), -DVec3::Z, 0.3, 0.05),
             look_at(&scene, v(0.45, 0.4, 0.75), v(0.2, 0.1, 1.0), 0.1, 0.1),
         ];
-        let seen = radiance(&scene, &mcpt(), &cameras, 1 << 13, Part::All);
+        let seen = radiance(&scene, &mcpt(), &cameras, 1 << 15, Part::All);
         for (place, l) in ["floor under it", "ceiling", "the ball"].into_iter().zip(seen) {
             out.pixel(&format!("{what}: {place}"), 1.0, l.times(0.5 * PI));
         }
