@@ -438,18 +438,22 @@ fn converged(case: &Case, out: &mut Outcome<'_>, size: f64, rho: [f64; 6], e: f6
 }
 
 fn rad_018_sealed_rooms(_: &Case, out: &mut Outcome<'_>) {
-    for (what, thickness) in [("wall of 1e-4", 1e-4), ("wall without thickness", 0.0)] {
+    let walls = [("wall of 1e-4", 1e-4), ("wall without thickness", 0.0)];
+    for ((what, thickness), lamp) in walls.into_iter().flat_map(|w| [(w, "ceiling"), (w, "point light")]) {
+        let what = &format!("{what}, {lamp}");
         let mut model = Model::new();
         let x = 5.0 + thickness;
         for (name, x0, x1) in [("lit", 0.0, 5.0), ("dark", x, 10.0)] {
             for (i, face) in box_faces(v(x0, 0., 0.), v(x1, 5., 3.)).iter().enumerate() {
                 if thickness > 0.0 || (name, i) != ("dark", 0) {
-                    let e = if (name, i) == ("lit", 5) { 1.0 } else { 0.0 };
+                    let e = if (name, i, lamp) == ("lit", 5, "ceiling") { 1.0 } else { 0.0 };
                     model.add(name, polygon(face), glow(0.9, e));
                 }
             }
         }
-        model.point_light(10.0, v(2.0, 2.0, 2.0));
+        if lamp == "point light" {
+            model.point_light(10.0, v(2.0, 2.0, 2.0));
+        }
         let room = Room::new(model.finish());
         let dark = room.triangles("dark");
         let mut rays = 0;
@@ -460,17 +464,13 @@ fn rad_018_sealed_rooms(_: &Case, out: &mut Outcome<'_>) {
             out.exact(&format!("B, {what}, {direct:?}"), 0.0, room.mean_of(&solution, &dark).x);
             out.exact(&format!("escaped, {what}, {direct:?}"), 0.0, solution.ledger.escaped[0]);
         }
-        let camera = look_at(&room.scene, v(x, 2.5, 1.5), v(1.0, 0.1, 0.1), 4.0, 0.9);
         let gsii = Settings { r_thresh: Some(0.5), patch_size: Some(0.5), ..Settings::default() };
         for (method, settings) in [("path tracing", mcpt()), ("GSII", gsii)] {
             let prepared = prepare(&room.scene, settings).unwrap();
+            let camera = look_at(&room.scene, v(x, 2.5, 1.5), v(1.0, 0.1, 0.1), 4.0, 0.9);
             let film = image(&prepared, &camera, [48, 48], 128, 1);
             let most = film.pixels().map(|p| Part::All.of(p)[0]).fold(0.0, f64::max);
             out.exact(&format!("brightest of 2304 pixels, {what}, {method}"), 0.0, most);
-            if most > 0.0 {
-                let lit = film.pixels().enumerate().filter(|(_, p)| Part::All.of(p)[0] > 0.0);
-                println!("lit pixels of {what}, {method}: {:?}", lit.map(|(i, _)| (i % 48, i / 48)).collect::<Vec<_>>());
-            }
         }
         out.note(format!("{what}: {:.0e} rays of radiosity.", rays as f64));
     }

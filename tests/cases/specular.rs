@@ -100,6 +100,7 @@ pub fn slab(case: &Case, out: &mut Outcome<'_>, n: f64, thickness: f64, degrees:
     let block = 15.0 * thickness;
     let rel = case.tolerance("/rel");
     let (transmittance, shift) = (case.values("/T_unpolarised_rt"), case.values("/shift"));
+    let single = case.values("/T_single_pass");
     for (i, degrees) in degrees.iter().enumerate() {
         let (sin, cos) = degrees.to_radians().sin_cos();
         let back = v(-sin, 0.0, cos);
@@ -126,7 +127,8 @@ pub fn slab(case: &Case, out: &mut Outcome<'_>, n: f64, thickness: f64, degrees:
         let window = (0.02 * shift[i]).max(rel * thickness);
         let prepared = prepare(&half, mcpt()).unwrap();
         let film = image(&prepared, &camera(&half, shift[i], window), [PIXELS, 1], 256, 1);
-        let lit = film.pixels().filter(|p| Part::All.of(p)[0] > 0.0).count();
+        // The beam without internal reflections comes out last; what the rim sends back is far weaker.
+        let lit = film.pixels().filter(|p| Part::All.of(p)[0] > 0.5 * single[i]).count();
         let edge = shift[i] - window + 2.0 * window * lit as f64 / f64::from(PIXELS);
         let allowed = if shift[i] > 0.0 { rel * shift[i] } else { rel * thickness };
         out.near(&format!("shift at {degrees} degrees, m"), shift[i], edge, allowed);
