@@ -25,18 +25,8 @@ pub const RECIPES: &[(&str, Recipe)] = &[
     ("CIE-009", |c, o| isotropic(c, o, 350.0, 2.4, &[[0., 0.], [1.2, 0.7], [3., 0.], [5., 4.]])),
 ];
 
-const TABLE_POINTS: [[f64; 2]; 10] = [
-    [0., 0.],
-    [0.5, 0.],
-    [1., 0.],
-    [1.5, 0.],
-    [0.5, 0.5],
-    [1., 0.5],
-    [1.5, 0.5],
-    [1., 1.],
-    [1.5, 1.],
-    [1.5, 1.5],
-];
+const TABLE_POINTS: [[f64; 2]; 10] =
+    [[0., 0.], [0.5, 0.], [1., 0.], [1.5, 0.], [0.5, 0.5], [1., 0.5], [1.5, 0.5], [1., 1.], [1.5, 1.], [1.5, 1.5]];
 
 fn cie_001_lambertian_source(case: &Case, out: &mut Outcome<'_>) {
     let mut model = Model::new();
@@ -134,7 +124,12 @@ fn cie_006_diffuse_floor(case: &Case, out: &mut Outcome<'_>) {
         let measured = indirect(&model, &points, &settings, 1 << 14);
         for (i, (e, expected)) in measured.into_iter().zip(case.values("")).enumerate() {
             let e = e.times(100.0 / 0.3);
-            out.mean(&format!("100 E / (E_hz rho) at point {}, {method}", i + 1), expected, e, case.tolerance("/rel") * expected);
+            out.mean(
+                &format!("100 E / (E_hz rho) at point {}, {method}", i + 1),
+                expected,
+                e,
+                case.tolerance("/rel") * expected,
+            );
         }
     }
 }

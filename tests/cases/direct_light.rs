@@ -81,7 +81,8 @@ fn dir_007_soft_shadow(case: &Case, out: &mut Outcome<'_>) {
     let mut model = Model::new();
     model.add("lamp", square_lamp(0.5, 2.0), lamp_material(1.0));
     model.add("blocker", level([-0.3, 0.3], [-0.3, 0.3], 1.0, true), grey(0.0));
-    let points = [(0., 0.), (0.3, 0.), (0.6, 0.), (0.8, 0.1), (1.2, 0.), (2., 2.)].map(|(x, y)| (v(x, y, 0.), DVec3::Z));
+    let points =
+        [(0., 0.), (0.3, 0.), (0.6, 0.), (0.8, 0.1), (1.2, 0.), (2., 2.)].map(|(x, y)| (v(x, y, 0.), DVec3::Z));
     for (i, (e, expected)) in direct(&model, &points, 1 << 14).into_iter().zip(case.values("")).enumerate() {
         if expected == 0.0 {
             out.near("E in full shadow", 0.0, e.mean, case.tolerance("/zero_abs"));

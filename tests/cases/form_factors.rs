@@ -35,9 +35,7 @@ pub const RECIPES: &[(&str, Recipe)] = &[
     ("FF-019", |_, o| shot(o, disc_up(0.5, 0.0), disc_down(2.0, 1.0))),
     ("FF-020", |_, o| shot(o, disc_up(1.0, 0.0), disc_down(1.0, 1.0 / 1024.0))),
     ("FF-044", |_, o| shot(o, disc_up(1.0, 0.0), disc_down(2.0, 50.0))),
-    ("FF-021", |_, o| {
-        element(o, DVec3::ZERO, DVec3::Z, &[v(0., 0., 1.), v(0., 2., 1.), v(1., 2., 1.), v(1., 0., 1.)])
-    }),
+    ("FF-021", |_, o| element(o, DVec3::ZERO, DVec3::Z, &[v(0., 0., 1.), v(0., 2., 1.), v(1., 2., 1.), v(1., 0., 1.)])),
     ("FF-022", |_, o| {
         element(o, v(0.5, 0.5, 0.), DVec3::Z, &[v(0., 0., 0.), v(0., 1., 0.), v(0., 1., 1.), v(0., 0., 1.)])
     }),

@@ -19,6 +19,7 @@ use crate::kit::*;
 use crate::radiosity::irradiance_at;
 use crate::report::{Case, Estimate, Outcome};
 
+#[expect(clippy::approx_constant, reason = "0.318 is a length, 0.053 times 6")]
 pub const RECIPES: &[(&str, Recipe)] = &[
     ("GSII-001", |c, o| threshold(c, o, 1.0 / (2.0 * PI), 0.5, &[0.2499, 0.2501, 0.0001, 4.0])),
     ("GSII-002", |c, o| threshold(c, o, 1.0 / (2.0 * PI), 0.318, &[])),
@@ -95,12 +96,7 @@ fn gsii_003_error_bound(case: &Case, out: &mut Outcome<'_>) {
     let exact = case.values("/exact_disc")[0];
     let traced = lost(&mcpt());
     out.mean("irradiance over B by path tracing", exact, traced, rel * exact);
-    let settings = Settings {
-        r_thresh: Some(1.0),
-        beta: beta as f32,
-        patch_size: Some(0.5),
-        ..Settings::default()
-    };
+    let settings = Settings { r_thresh: Some(1.0), beta: beta as f32, patch_size: Some(0.5), ..Settings::default() };
     let result = simplified(&scene, &SimplifyParams { r_thresh: 1.0, ..simplify_params(1.0, beta, BoxFit::Flux) });
     let disc_class = result.surfaces[result.surface_of_triangle[0] as usize].class;
     out.holds("the disc is removed", disc_class.is_isolated());
@@ -547,7 +543,12 @@ fn gsii_020_black_room(case: &Case, out: &mut Outcome<'_>) {
                 .collect()
         });
         for (i, ratio) in ratios.into_iter().enumerate() {
-            out.mean(&format!("B over rho E, half face {i}, {fit:?}"), case.values("/B_over_rho_E")[0], ratio, case.tolerance("/rel"));
+            out.mean(
+                &format!("B over rho E, half face {i}, {fit:?}"),
+                case.values("/B_over_rho_E")[0],
+                ratio,
+                case.tolerance("/rel"),
+            );
         }
     }
 }
@@ -562,8 +563,7 @@ fn gsii_021_energy(case: &Case, out: &mut Outcome<'_>) {
     }
     let scene = model.finish();
     for fit in [BoxFit::Flux, BoxFit::Paper1993] {
-        let settings =
-            Settings { r_thresh: Some(1.2), box_fit: fit, patch_size: Some(0.5), ..Settings::default() };
+        let settings = Settings { r_thresh: Some(1.2), box_fit: fit, patch_size: Some(0.5), ..Settings::default() };
         for direct in [DirectLight::Shoot, DirectLight::Gather] {
             let prepared = prepare(&scene, Settings { direct, ..settings.clone() }).unwrap();
             let far = prepared.far.as_ref().unwrap();
@@ -604,14 +604,10 @@ fn gsii_025_valley(case: &Case, out: &mut Outcome<'_>) {
     let scene = cube().finish();
     let result = simplified(&scene, &simplify_params(1.2, 1.0 / (2.0 * PI), BoxFit::Flux));
     out.holds("no wall is removed", result.surfaces.iter().all(|s| s.class == Class::Normal));
-    let settings = Settings {
-        r_thresh: Some(1.2),
-        patch_size: Some(0.1),
-        radiosity_error: 0.01,
-        ..Settings::default()
-    };
+    let settings =
+        Settings { r_thresh: Some(1.2), patch_size: Some(0.1), radiosity_error: 0.01, ..Settings::default() };
     let point = [("z0", 0.05, 0.05)];
-    let [hybrid, traced] = [settings, mcpt()]
-        .map(|s| irradiance_at(&cube(), 1.0, |_| 0.5, &point, &s, 1 << 13, Part::Indirect)[0].mean);
+    let [hybrid, traced] =
+        [settings, mcpt()].map(|s| irradiance_at(&cube(), 1.0, |_| 0.5, &point, &s, 1 << 13, Part::Indirect)[0].mean);
     out.near("LORES of GSII over that of path tracing", 1.0, hybrid / traced, 0.01);
 }

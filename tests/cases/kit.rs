@@ -116,11 +116,12 @@ pub fn diced([a, b, c, d]: Quad, n: u32) -> Triangles {
         let (s, t) = (f64::from(i) / f64::from(n), f64::from(j) / f64::from(n));
         a.lerp(b, s).lerp(d.lerp(c, s), t)
     };
-    (0..n * n).flat_map(|k| {
-        let (i, j) = (k % n, k / n);
-        polygon(&[at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)])
-    })
-    .collect()
+    (0..n * n)
+        .flat_map(|k| {
+            let (i, j) = (k % n, k / n);
+            polygon(&[at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)])
+        })
+        .collect()
 }
 
 pub fn grey(rho: f64) -> Material {
@@ -404,9 +405,8 @@ pub fn all_parts(
         .par_iter()
         .map(|&(s, c)| {
             let film = image(&prepared[s % solutions], &cameras[c], size, trials, seeds[s]);
-            [Part::Direct, Part::Indirect, Part::All].map(|part| {
-                film.pixels().map(|p| part.of(p)[0]).sum::<f64>() / f64::from(size[0] * size[1])
-            })
+            [Part::Direct, Part::Indirect, Part::All]
+                .map(|part| film.pixels().map(|p| part.of(p)[0]).sum::<f64>() / f64::from(size[0] * size[1]))
         })
         .collect();
     let by_seed: Vec<Vec<f64>> = values.chunks(cameras.len()).map(|v| v.concat()).collect();

@@ -25,9 +25,15 @@ type Recipe = fn(&Case, &mut Outcome<'_>);
 const KNOWN: &[(&str, &str)] = &[];
 
 fn recipe(id: &str) -> Option<Recipe> {
-    let all =
-        [form_factors::RECIPES, radiosity::RECIPES, direct_light::RECIPES, cie::RECIPES, specular::RECIPES,
-        gsii::RECIPES, hard::RECIPES];
+    let all = [
+        form_factors::RECIPES,
+        radiosity::RECIPES,
+        direct_light::RECIPES,
+        cie::RECIPES,
+        specular::RECIPES,
+        gsii::RECIPES,
+        hard::RECIPES,
+    ];
     all.iter().flat_map(|r| r.iter()).find(|(name, _)| *name == id).map(|(_, recipe)| *recipe)
 }
 

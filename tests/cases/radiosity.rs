@@ -47,7 +47,12 @@ const EXITANCE_007: [f64; 6] = [0., 2., 0., 0., 0., 1.];
 const RHO_FURNACE: [f64; 7] = [0., 0.1, 0.3, 0.5, 0.7, 0.8, 0.9];
 
 /// Radiosity, emission included, of the objects of the given names, over seeds.
-fn radiosities(room: &Room, names: &[&str], exitance: &[f64], params: impl Fn(u32) -> RadiosityParams) -> Vec<Estimate> {
+fn radiosities(
+    room: &Room,
+    names: &[&str],
+    exitance: &[f64],
+    params: impl Fn(u32) -> RadiosityParams,
+) -> Vec<Estimate> {
     over_seeds(|seed| {
         let solution = room.solve(&params(seed)).unwrap();
         names.iter().zip(exitance).map(|(name, e)| room.mean(&solution, name) + e).collect()
@@ -177,7 +182,10 @@ fn rad_005_refused(_: &Case, out: &mut Outcome<'_>) {
     let room = Room::new(furnace(1.0).finish());
     for direct in [DirectLight::Shoot, DirectLight::Gather] {
         let refused = room.solve(&RadiosityParams { direct, ..one_patch(1e-2, 1) });
-        out.holds(&format!("rho 1 with emission, {direct:?}: no steady state"), matches!(refused, Err(Error::Unsolvable(_))));
+        out.holds(
+            &format!("rho 1 with emission, {direct:?}: no steady state"),
+            matches!(refused, Err(Error::Unsolvable(_))),
+        );
     }
     for rho in [1.01, -0.1, f64::NAN] {
         let mut model = furnace(0.5);
@@ -266,7 +274,9 @@ fn rad_011_infinite_plates(case: &Case, out: &mut Outcome<'_>) {
     for (z, up, material) in [(0.0, true, glow(0.5, 1.0)), (1.0, false, grey(0.8))] {
         let far = [-512.0, 512.0];
         let name = if up { "lower" } else { "upper" };
-        for (x, y) in [([-512., -32.], far), ([32., 512.], far), ([-32., 32.], [-512., -32.]), ([-32., 32.], [32., 512.])] {
+        for (x, y) in
+            [([-512., -32.], far), ([32., 512.], far), ([-32., 32.], [-512., -32.]), ([-32., 32.], [32., 512.])]
+        {
             model.add("rim", level(x, y, z, up), material.clone());
         }
         model.add(name, level([-32., 32.], [-32., 32.], z, up), material);
@@ -291,8 +301,7 @@ fn shortfall(case: &Case, out: &mut Outcome<'_>, rho: f64, stop: f64) {
     for unshot in [0.3, 0.1, 0.03, stop] {
         let params = RadiosityParams { unshot, ambient: false, ..one_patch(0.05, 3) };
         let solution = room.solve(&params).unwrap();
-        let reflected: f64 =
-            FACES.iter().map(|f| room.area(&room.triangles(f)) * room.mean(&solution, f)).sum();
+        let reflected: f64 = FACES.iter().map(|f| room.area(&room.triangles(f)) * room.mean(&solution, f)).sum();
         let u = solution.ledger.unshot[0];
         let rho = f64::from(rho as f32);
         let identity = ((1.0 - rho) * (emitted + reflected) + rho * u - emitted) / emitted;

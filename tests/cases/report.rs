@@ -194,8 +194,11 @@ impl<'a> Outcome<'a> {
             let fault = check.fault.as_ref().map_or(String::new(), |f| format!(" ({f})"));
             let Check { what, expected, measured, allowed, .. } = check;
             let off = (measured - expected).abs();
-            write!(text, "{what}: {measured:.7e}{error}, expected {expected:.7e}, off {off:.1e} of {allowed:.1e}{fault}; ")
-                .unwrap();
+            write!(
+                text,
+                "{what}: {measured:.7e}{error}, expected {expected:.7e}, off {off:.1e} of {allowed:.1e}{fault}; "
+            )
+            .unwrap();
         }
         write!(text, "{} checks", self.checks.len()).unwrap();
         text

@@ -62,7 +62,12 @@ fn spec_002_special_angles(case: &Case, out: &mut Outcome<'_>) {
         let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
         if p_polarised(a) < p_polarised(b) { high = b } else { low = a }
     }
-    out.near("p-polarised reflectance at the angle", case.values("/Rp_at_brewster")[0], p_polarised(0.5 * (low + high)), abs);
+    out.near(
+        "p-polarised reflectance at the angle",
+        case.values("/Rp_at_brewster")[0],
+        p_polarised(0.5 * (low + high)),
+        abs,
+    );
     let brewster = case.values("/brewster_deg")[0];
     out.near("reflectance at the exact angle", 0.0, p_polarised(brewster), abs);
     let (mut low, mut high) = (20_f64, 80_f64);
@@ -159,7 +164,11 @@ fn spec_005_flux_of_a_mirror(case: &Case, out: &mut Outcome<'_>) {
     out.note("Flux on the walls with the mirror, less that with a black panel.");
     let room = |panel: Material| {
         let mut model = Model::new();
-        model.add("wall", box_faces(v(-2., -2., 0.), v(2., 2., 2.)).iter().flat_map(|q| polygon(q)).collect(), grey(BLACK));
+        model.add(
+            "wall",
+            box_faces(v(-2., -2., 0.), v(2., 2., 2.)).iter().flat_map(|q| polygon(q)).collect(),
+            grey(BLACK),
+        );
         let h = [-0.5, 0.5];
         let corners = [v(1., h[0], 0.5), v(1., h[0], 1.5), v(1., h[1], 1.5), v(1., h[1], 0.5)];
         model.add("panel", polygon(&corners), panel);
@@ -233,8 +242,7 @@ fn spec_006_mirror_ball(case: &Case, out: &mut Outcome<'_>) {
         let mut edges: Vec<f64> = [0.0, 0.5].into_iter().chain(rings).collect();
         edges.sort_by(f64::total_cmp);
         edges.dedup();
-        let parts: Vec<_> =
-            edges.windows(2).map(|w| (format!("up to {}", w[1]), ring(w[0], w[1]))).collect();
+        let parts: Vec<_> = edges.windows(2).map(|w| (format!("up to {}", w[1]), ring(w[0], w[1]))).collect();
         let flux = caustic(&parts, patch_size);
         let within = |r: f64| -> f64 {
             edges.windows(2).zip(&flux).skip(1).filter(|(w, _)| w[1] <= r).map(|(_, f)| f.mean).sum()
@@ -345,7 +353,10 @@ fn spec_009_dielectric(case: &Case, out: &mut Outcome<'_>) {
             let what = format!("published, roughness {roughness}, cosine {cosine}");
             out_albedo(out, &what, expected[5 * i + j], albedo, case.tolerance("/abs"));
             let own = own_albedo(roughness, cosine);
-            out.holds(&format!("own albedo {own} at most 1, roughness {roughness}, cosine {cosine}"), own <= 1.0 + 1e-6);
+            out.holds(
+                &format!("own albedo {own} at most 1, roughness {roughness}, cosine {cosine}"),
+                own <= 1.0 + 1e-6,
+            );
         }
     }
 }
