@@ -14,6 +14,7 @@ mod radiosity;
 mod report;
 mod specular;
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Instant;
 
 use report::{Case, Outcome, Row, table};
@@ -22,7 +23,10 @@ use report::{Case, Outcome, Row, table};
 type Recipe = fn(&Case, &mut Outcome<'_>);
 
 /// Cases that are known to fail, with the reason.
-const KNOWN: &[(&str, &str)] = &[];
+const KNOWN: &[(&str, &str)] = &[(
+    "RAD-018",
+    "long paths leak: of 3e6 bounces by path tracing some hundred end up in the other room, where walls meet exactly",
+)];
 
 fn recipe(id: &str) -> Option<Recipe> {
     let all = [
@@ -58,7 +62,10 @@ fn main() {
         };
         let start = Instant::now();
         let mut outcome = Outcome::new(case);
-        recipe(case, &mut outcome);
+        let measured = catch_unwind(AssertUnwindSafe(|| recipe(case, &mut outcome)));
+        if measured.is_err() {
+            outcome.holds("measured without a panic", false);
+        }
         let seconds = start.elapsed().as_secs_f64();
         let known = KNOWN.iter().find(|(id, _)| *id == case.id).map(|(_, reason)| *reason);
         let verdict = match (outcome.passes(), known) {
