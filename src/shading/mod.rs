@@ -5,8 +5,8 @@
 
 mod albedo;
 pub mod bsdf;
-mod fresnel;
-mod ggx;
+pub mod fresnel;
+pub mod ggx;
 mod glass;
 mod layered;
 pub mod point;
