@@ -11,7 +11,7 @@ use crate::simplify::TriangleSource;
 const MAX_PANES: usize = 64;
 
 /// How far from the light a hit may lie that is put down to rounding, as a share of the distance.
-const NEAR_LIGHT: f32 = 1.0 / 1024.0;
+const NEAR_LIGHT: f32 = 1.0 / 4096.0;
 /// Cosine of the angle up to which a surface at the light counts as lying in its plane.
 const COPLANAR: f32 = 0.999;
 
@@ -27,8 +27,8 @@ pub struct ShadowRay {
 /// Share of light that comes through along each of `batch`: 0 where something opaque lies between the surface and the
 /// light, else the product of the transmittances of all panes in between.
 ///
-/// The nearest hit decides, and not whether there is one before a margin: with a margin, light sampled close to a wall would
-/// shine on what lies behind the wall.
+/// Next to the light the nearest hit decides, and not whether there is one before a margin: with a margin alone, light sampled
+/// close to a wall would shine on what lies behind the wall.
 ///
 /// `rays` was built from the triangles of `scene`, or from others whose sources are given as `sources`.
 pub fn light_visibility(
@@ -36,38 +36,52 @@ pub fn light_visibility(
     scene: &Scene,
     sources: Option<&[TriangleSource]>,
     batch: &[ShadowRay],
+    coherence: Coherence,
     through: &mut [Vec3],
 ) {
     let panes = scene.mesh.objects.iter().any(|o| o.kind == PartKind::Pane);
     let visible = if panes { Visible::WithoutPanes } else { Visible::All };
-    let beyond = |shadow: &ShadowRay| match shadow.light {
-        Hit::NONE => shadow.ray,
-        _ => Ray { t_far: shadow.ray.t_far * (1.0 + NEAR_LIGHT), ..shadow.ray },
-    };
-    let queries: Vec<Ray> = batch.iter().map(beyond).collect();
-    let mut hits = vec![Hit::MISS; batch.len()];
-    rays.closest(&queries, visible, Coherence::Coherent, &mut hits);
-    for ((share, shadow), hit) in through.iter_mut().zip(batch).zip(&hits) {
-        *share = if reaches(scene, sources, shadow, hit) { Vec3::ONE } else { Vec3::ZERO };
+    let before: Vec<Ray> = batch.iter().map(ShadowRay::before_light).collect();
+    let mut occluded = vec![false; batch.len()];
+    rays.occluded(&before, visible, coherence, &mut occluded);
+    for (share, blocked) in through.iter_mut().zip(&occluded) {
+        *share = if *blocked { Vec3::ZERO } else { Vec3::ONE };
+    }
+    let at_light: Vec<usize> =
+        (0..batch.len()).filter(|&i| !occluded[i] && batch[i].light != Hit::NONE).collect();
+    let last: Vec<Ray> = at_light.iter().map(|&i| batch[i].around_light()).collect();
+    let mut hits = vec![Hit::MISS; last.len()];
+    rays.closest(&last, visible, coherence, &mut hits);
+    for (&i, hit) in at_light.iter().zip(&hits) {
+        if !reaches(scene, sources, &batch[i], hit) {
+            through[i] = Vec3::ZERO;
+        }
     }
     if panes {
-        let batch: Vec<Ray> = batch
-            .iter()
-            .map(
-                |s| if s.light == Hit::NONE { s.ray } else { Ray { t_far: s.ray.t_far * (1.0 - NEAR_LIGHT), ..s.ray } },
-            )
-            .collect();
-        pass_panes(rays, scene, sources, &batch, through);
+        pass_panes(rays, scene, sources, &before, through);
     }
 }
 
-/// Whether a shadow ray whose nearest hit is `hit` reaches its light.
+impl ShadowRay {
+    /// The ray up to where rounding begins to matter for a hit on the light itself.
+    fn before_light(&self) -> Ray {
+        match self.light {
+            Hit::NONE => self.ray,
+            _ => Ray { t_far: self.ray.t_far * (1.0 - NEAR_LIGHT), ..self.ray },
+        }
+    }
+
+    /// The rest of it, and as much beyond the light.
+    fn around_light(&self) -> Ray {
+        let t = self.ray.t_far;
+        Ray { t_near: t * (1.0 - NEAR_LIGHT), t_far: t * (1.0 + NEAR_LIGHT), ..self.ray }
+    }
+}
+
+/// Whether a shadow ray reaches its light, when `hit` is the nearest around the light.
 fn reaches(scene: &Scene, sources: Option<&[TriangleSource]>, shadow: &ShadowRay, hit: &Hit) -> bool {
     if !hit.is_hit() {
         return true;
-    }
-    if shadow.light == Hit::NONE || hit.t < shadow.ray.t_far * (1.0 - NEAR_LIGHT) {
-        return false;
     }
     let Some(triangle) = in_scene(sources, hit.triangle) else {
         return false;
@@ -85,29 +99,6 @@ fn in_scene(sources: Option<&[TriangleSource]>, triangle: u32) -> Option<u32> {
         None => Some(triangle),
         Some(TriangleSource::Scene { triangle }) => Some(triangle),
         Some(TriangleSource::BoxFace { .. }) => None,
-    }
-}
-
-/// Share of light that comes through along each of `batch`, for use with any number of rays at once: 0 where something
-/// opaque lies between `t_near` and `t_far`, else the product of the transmittances of all panes in between.
-///
-/// `rays` was built from the triangles of `scene`, or from others whose sources are given as `sources`.
-pub fn visibility(
-    rays: &dyn RayScene,
-    scene: &Scene,
-    sources: Option<&[TriangleSource]>,
-    batch: &[Ray],
-    through: &mut [Vec3],
-) {
-    let panes = scene.mesh.objects.iter().any(|o| o.kind == PartKind::Pane);
-    let visible = if panes { Visible::WithoutPanes } else { Visible::All };
-    let mut occluded = vec![false; batch.len()];
-    rays.occluded(batch, visible, Coherence::Coherent, &mut occluded);
-    for (share, blocked) in through.iter_mut().zip(&occluded) {
-        *share = if *blocked { Vec3::ZERO } else { Vec3::ONE };
-    }
-    if panes {
-        pass_panes(rays, scene, sources, batch, through);
     }
 }
 

@@ -13,7 +13,7 @@ pub use stats::Stats;
 
 use crate::backend::embree::EmbreeBackend;
 use crate::backend::obvhs::ObvhsBackend;
-use crate::backend::{PartKind, RayBackend, RayScene, TriangleSet};
+use crate::backend::{RayBackend, RayScene, TriangleSet};
 use crate::error::{Error, Result};
 use crate::lighting::Lights;
 use crate::progress::Progress;
@@ -90,7 +90,6 @@ impl Prepared {
             scene: &self.scene,
             lights: &self.lights,
             detailed: self.detailed.as_ref(),
-            has_panes: self.scene.mesh.objects.iter().any(|o| o.kind == PartKind::Pane),
             simplified: self.far.as_ref().and_then(|far| far.simplified.as_ref()),
             far: self.far.as_ref().map(|far| FarField {
                 rays: far.rays.as_ref(),

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::RadiosityScene;
 use super::patches::Patches;
 use super::shoot::side_normal;
-use crate::backend::Ray;
+use crate::backend::{Coherence, Ray};
 use crate::lighting::shadow::{ShadowRay, light_visibility};
 use crate::sampling;
 
@@ -100,7 +100,8 @@ fn estimate(input: &RadiosityScene<'_>, patches: &Patches, counts: &[u32], strea
                 }
             }
             let mut through = vec![glam::Vec3::ONE; rays.len()];
-            light_visibility(input.rays, input.scene, Some(&input.geometry.sources), &rays, &mut through);
+            let sources = Some(input.geometry.sources.as_slice());
+            light_visibility(input.rays, input.scene, sources, &rays, Coherence::Coherent, &mut through);
             let mut estimates = vec![Estimate::default(); counts.len()];
             let mut squares = vec![0.0; counts.len()];
             for ((k, value), seen) in values.into_iter().zip(through) {

@@ -23,16 +23,13 @@ use super::film::{Feature, Tile};
 use super::nearness::Nearness;
 use super::path::{Arrival, Passes, Path, Shadow};
 use crate::backend::{Coherence, Hit, Ray, RayScene, Visible};
-use crate::lighting::{Lights, shadow};
+use crate::lighting::Lights;
+use crate::lighting::shadow::{ShadowRay, light_visibility};
 use crate::radiosity::Solution;
 use crate::sampling::{hash_all, sobol};
 use crate::scene::{Camera, Scene};
 use crate::shading::{Bsdf, Lobes, SurfacePoint};
 use crate::simplify::{Simplified, SimplifiedGeometry, TriangleSource};
-
-/// Distance that shadow rays stop short of the light, relative: covers the rounding of an intersection with the light's own
-/// triangle.
-const SHADOW_MARGIN: f32 = 1.0 / 8192.0;
 
 /// A far ray starts this much (relative) before the near one ended, so that nothing falls between the two.
 const SEAM: f32 = 4.0 * f32::EPSILON;
@@ -55,8 +52,6 @@ pub struct World<'a> {
     pub lights: &'a Lights,
     /// Normal and complex surfaces.
     pub detailed: &'a dyn RayScene,
-    /// Whether the detailed scene has surfaces that transmit without bending.
-    pub has_panes: bool,
     /// How the far field's scene came about, for layers that show it.
     pub simplified: Option<&'a Simplified>,
     /// The far field; without one all light is path traced (MCPT).
@@ -167,8 +162,7 @@ pub struct Workspace {
     hits: Vec<Hit>,
     far: Vec<u32>,
     shadows: Vec<Shadow>,
-    shadow_rays: Vec<Ray>,
-    occluded: Vec<bool>,
+    shadow_rays: Vec<ShadowRay>,
     transmittance: Vec<Vec3>,
     hires: Vec<Vec3>,
     lores: Vec<Vec3>,
@@ -517,25 +511,18 @@ impl<'a> World<'a> {
         if radiance == Vec3::ZERO {
             return;
         }
-        let t_far = light.distance * (1.0 - SHADOW_MARGIN);
-        ws.shadow_rays.push(Ray { t_far, ..Ray::new(point.ray_origin(light.direction), light.direction) });
+        let ray = Ray { t_far: light.distance, ..Ray::new(point.ray_origin(light.direction), light.direction) };
+        ws.shadow_rays.push(ShadowRay { ray, light: light.triangle });
         ws.shadows.push(Shadow { radiance, trial: path.trial, gathers: path.gathers });
     }
 
     /// Traces all shadow rays of the round and adds what arrives.
     fn trace_shadows(&self, ws: &mut Workspace, coherence: Coherence) {
-        let n = ws.shadow_rays.len();
-        if self.has_panes {
-            ws.transmittance.resize(n, Vec3::ZERO);
-            shadow::visibility(self.detailed, self.scene, None, &ws.shadow_rays, &mut ws.transmittance);
-        } else {
-            ws.occluded.resize(n, false);
-            self.detailed.occluded(&ws.shadow_rays, Visible::All, coherence, &mut ws.occluded);
-        }
-        for (i, s) in ws.shadows.iter().enumerate() {
-            let share = if self.has_panes { ws.transmittance[i] } else { Vec3::splat(f32::from(!ws.occluded[i])) };
+        ws.transmittance.resize(ws.shadow_rays.len(), Vec3::ZERO);
+        light_visibility(self.detailed, self.scene, None, &ws.shadow_rays, coherence, &mut ws.transmittance);
+        for (s, share) in ws.shadows.iter().zip(&ws.transmittance) {
             let sum = if s.gathers { &mut ws.lores } else { &mut ws.hires };
-            sum[s.trial as usize] += s.radiance * share;
+            sum[s.trial as usize] += s.radiance * *share;
             if s.gathers {
                 ws.counts.shadow_lores += 1;
             } else {

@@ -282,6 +282,7 @@ pub fn simplify_params(r_thresh: f64, beta: f64, box_fit: BoxFit) -> SimplifyPar
         box_fit,
         crease_angle: 30_f32.to_radians(),
         face_resolution: 2,
+        longest: gsii::simplify::LONGEST_CLUSTER,
         seed: 1,
     }
 }

@@ -7,7 +7,7 @@ use gsii::backend::Hit;
 use gsii::radiosity::{DirectLight, RadiosityParams};
 use gsii::sampling::{cosine_hemisphere, sobol};
 use gsii::scene::{Camera, Material, MeshData, Projection};
-use gsii::shading::{Bsdf, SurfacePoint, fresnel, ggx};
+use gsii::shading::{Bsdf, Lobes, SurfacePoint, fresnel, ggx};
 
 use crate::Recipe;
 use crate::kit::*;
@@ -369,7 +369,7 @@ fn own_albedo(roughness: f64, cosine: f64) -> f64 {
     model.add("surface", level([0., 1.], [0., 1.], 0.0, true), material);
     let scene = model.finish();
     let point = SurfacePoint::new(&scene, &Hit { t: 1.0, u: 0.25, v: 0.25, triangle: 0 });
-    let bsdf = Bsdf::new(&scene, &point, towards(cosine), 0.3);
+    let bsdf = Bsdf::new(&scene, &point, towards(cosine), Lobes { threshold: 0.3, ..Lobes::MIRRORS });
     (bsdf.albedo_low() + bsdf.albedo_high()).max_element().into()
 }
 
