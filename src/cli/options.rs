@@ -50,7 +50,7 @@ pub struct MethodOptions {
     /// Distance up to which indirect light is traced in the detailed scene (scene units; 0 is PMM, inf is path tracing)
     #[arg(long, value_name = "LENGTH|auto", default_value = "auto", help_heading = "Method")]
     pub r_thresh: LengthOrAuto,
-    /// Share of the hemisphere that one dropped surface may fill, 0..1 [default: 1/2pi]
+    /// Share of the hemisphere that one dropped surface may fill, 0..1 [default: 0.02; the paper: 0.159]
     #[arg(long, value_name = "X", help_heading = "Method")]
     pub beta: Option<f32>,
     /// Stop radiosity when this share of the emitted flux is unshot

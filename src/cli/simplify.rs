@@ -31,7 +31,7 @@ pub struct Options {
     /// Distance beyond which the simplified scene is used (scene units)
     #[arg(long, value_name = "LENGTH|auto", default_value = "auto", help_heading = "Method")]
     r_thresh: LengthOrAuto,
-    /// Share of the hemisphere that one dropped surface may fill, 0..1 [default: 1/2pi]
+    /// Share of the hemisphere that one dropped surface may fill, 0..1 [default: 0.02; the paper: 0.159]
     #[arg(long, value_name = "X", help_heading = "Method")]
     beta: Option<f32>,
     /// How boxes are fitted to clusters

@@ -47,8 +47,7 @@ pub fn light_visibility(
     for (share, blocked) in through.iter_mut().zip(&occluded) {
         *share = if *blocked { Vec3::ZERO } else { Vec3::ONE };
     }
-    let at_light: Vec<usize> =
-        (0..batch.len()).filter(|&i| !occluded[i] && batch[i].light != Hit::NONE).collect();
+    let at_light: Vec<usize> = (0..batch.len()).filter(|&i| !occluded[i] && batch[i].light != Hit::NONE).collect();
     let last: Vec<Ray> = at_light.iter().map(|&i| batch[i].around_light()).collect();
     let mut hits = vec![Hit::MISS; last.len()];
     rays.closest(&last, visible, coherence, &mut hits);

@@ -1,7 +1,5 @@
 //! All that a user can choose, independent of the command line.
 
-use std::f32::consts::PI;
-
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
@@ -98,7 +96,7 @@ impl Default for Settings {
             method: Method::Gsii,
             geometry: GeometryKind::Ns,
             r_thresh: None,
-            beta: 1.0 / (2.0 * PI),
+            beta: 0.02,
             box_fit: BoxFit::Flux,
             crease_angle: 30.0_f32.to_radians(),
             longest_cluster: simplify::LONGEST_CLUSTER,
