@@ -7,7 +7,7 @@
 use rayon::prelude::*;
 
 use super::integrator::{Workspace, World};
-use super::path::{Arrival, Path};
+use super::path::Path;
 use crate::sampling::{hash_all, sobol};
 use crate::scene::Camera;
 use crate::shading::Lobes;
@@ -80,17 +80,7 @@ pub fn measure(world: &World<'_>, camera: &Camera, aspect: f32, samples: u32, se
 
 fn view_path(camera: &Camera, aspect: f32, index: u32, stream: u32) -> Path {
     let u = sobol(index, 0, stream);
-    Path {
-        ray: camera.ray(Vec2::new(u[0], u[1]), aspect),
-        throughput: Vec3::ONE,
-        near: f32::INFINITY,
-        arrival: Arrival::Sharp,
-        gathers: false,
-        depth: 0,
-        trial: index,
-        index,
-        stream,
-    }
+    Path::view(camera.ray(Vec2::new(u[0], u[1]), aspect), index, index, stream)
 }
 
 #[derive(Clone, Copy, Default)]

@@ -213,17 +213,8 @@ impl<'a> World<'a> {
                 let index = number >> 1;
                 let u = sobol(index, 0, stream);
                 let film = (Vec2::new(x as f32, y as f32) + Vec2::new(u[0], u[1])) / size;
-                ws.paths.push(Path {
-                    ray: camera.ray(film, aspect),
-                    throughput: Vec3::ONE,
-                    near: f32::INFINITY,
-                    arrival: Arrival::Sharp,
-                    gathers: false,
-                    depth: 0,
-                    trial: i as u32 * batch.trials + t,
-                    index,
-                    stream,
-                });
+                let trial = i as u32 * batch.trials + t;
+                ws.paths.push(Path::view(camera.ray(film, aspect), trial, index, stream));
             }
         }
         ws.features.clear();

@@ -65,6 +65,23 @@ pub struct Path {
     pub stream: u32,
 }
 
+impl Path {
+    /// A path that leaves the camera along `ray`.
+    pub fn view(ray: Ray, trial: u32, index: u32, stream: u32) -> Self {
+        Path {
+            ray,
+            throughput: Vec3::ONE,
+            near: f32::INFINITY,
+            arrival: Arrival::Sharp,
+            gathers: false,
+            depth: 0,
+            trial,
+            index,
+            stream,
+        }
+    }
+}
+
 /// A shadow ray and what it brings when nothing is in its way.
 #[derive(Clone, Copy, Debug)]
 pub struct Shadow {
