@@ -7,7 +7,7 @@ mod common;
 
 use common::{Estimate, cluttered_room, fixed, gltf, lit_room, prepare, render, scene, threshold, values};
 use gsii::pipeline::{BackendKind, Method, Settings};
-use gsii::render::{RenderParams, bias, show::show_radiosity};
+use gsii::render::{RenderParams, bias};
 
 const ALPHA: f64 = 1e-4;
 
@@ -21,10 +21,6 @@ fn bits(values: &[f64]) -> Vec<u64> {
 
 fn image(settings: Settings, params: &RenderParams) -> Vec<f64> {
     let (prepared, _) = prepare(&scene(&lit_room()), settings);
-    if prepared.settings.method == Method::Radiosity {
-        let world = prepared.world();
-        return values(&show_radiosity(&world, &world.far.unwrap(), &prepared.scene.cameras[0], params));
-    }
     values(&render(&prepared, params).film)
 }
 

@@ -2,16 +2,17 @@
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 
 use super::options::{MethodOptions, SceneOptions, Talk, load, set_threads};
+use crate::clock::Stopwatch;
 use crate::error::{Error, Result};
 use crate::image::{self, Metadata, ViewTransform, WriteOptions};
 use crate::pipeline::{Method, Prepared, Stats, choose_camera};
 use crate::render::layers::{Layer, develop};
-use crate::render::{self, PassTimes, RayCounts, RenderParams, Rendering, bias};
+use crate::render::{RenderParams, Rendering, bias};
 use crate::scene::Camera;
 
 /// Pairs of paths that measure the bias when not said otherwise.
@@ -88,7 +89,7 @@ pub struct Options {
 /// # Errors
 /// Bad options, bad input, a failing library, an image that cannot be written.
 pub fn run(options: &Options) -> Result<ExitCode> {
-    let start = Instant::now();
+    let start = Stopwatch::start();
     for path in &options.output {
         image::check_writable(path)?;
     }
@@ -104,7 +105,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     for warning in &stats.warnings {
         log::warn!("{warning}");
     }
-    let rendering = options.render(&prepared, &camera, &params, &progress);
+    let rendering = prepared.render(&camera, &params, &progress);
     stats.record_rendering(&rendering);
     if rendering.film.pixels().all(|p| p.hires.trials() == 0) {
         options.talk.say("gsii: stopped before the first trial; nothing was written");
@@ -113,7 +114,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     options.measure_bias(&prepared, &camera, &params, &rendering, &mut stats);
     options.record_parameters(&params, rendering.stopped, &mut stats);
 
-    let written = Instant::now();
+    let written = Stopwatch::start();
     let developed = develop(&rendering.film, options.layers());
     let metadata = metadata(&stats, &camera);
     let write_options = WriteOptions {
@@ -128,8 +129,8 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     for path in &options.output {
         image::write(path, &developed, &metadata, &write_options)?;
     }
-    stats.seconds.write = written.elapsed().as_secs_f64();
-    stats.seconds.total = start.elapsed().as_secs_f64();
+    stats.record_time(written, |s| &mut s.write);
+    stats.record_time(start, |s| &mut s.total);
     stats.peak_rss_bytes = peak_rss_bytes();
     if let Some(path) = &options.stats {
         write_stats(path, &stats)?;
@@ -180,24 +181,6 @@ impl Options {
         })
     }
 
-    fn render(
-        &self,
-        prepared: &Prepared,
-        camera: &Camera,
-        params: &RenderParams,
-        progress: &crate::progress::Progress,
-    ) -> Rendering {
-        let world = prepared.world();
-        if let (Method::Radiosity, Some(far)) = (prepared.settings.method, world.far) {
-            let start = Instant::now();
-            let film = render::show::show_radiosity(&world, &far, camera, params);
-            let times = PassTimes { hires: start.elapsed(), lores: Duration::ZERO };
-            let view = film.pixels().map(|p| u64::from(p.hires.trials())).sum();
-            return Rendering { film, rays: RayCounts { view, ..RayCounts::default() }, times, stopped: false };
-        }
-        render::render(&world, camera, params, progress)
-    }
-
     fn measure_bias(
         &self,
         prepared: &Prepared,
@@ -210,11 +193,11 @@ impl Options {
         if !gathers || prepared.far.is_none() || self.measure_bias == 0 || rendering.stopped {
             return;
         }
-        let start = Instant::now();
+        let start = Stopwatch::start();
         let aspect = params.width as f32 / params.height as f32;
         let bias = bias::measure(&prepared.world(), camera, aspect, self.measure_bias, params.seed);
         stats.record_bias(&bias, &rendering.film);
-        stats.seconds.bias = start.elapsed().as_secs_f64();
+        stats.record_time(start, |s| &mut s.bias);
     }
 
     fn record_parameters(&self, params: &RenderParams, stopped: bool, stats: &mut Stats) {

@@ -20,6 +20,7 @@ pub use nearness::Nearness;
 use path::Passes;
 use plan::Allocation;
 
+use crate::clock::Stopwatch;
 use crate::progress::Progress;
 use crate::sampling::hash_all;
 use crate::scene::Camera;
@@ -62,8 +63,42 @@ pub struct Rendering {
     pub rays: RayCounts,
     /// Wall-clock time of both passes, shared out by the time that threads spent in them; the pilot is in both.
     pub times: PassTimes,
+    /// The same for the time of all cores together.
+    pub cpu_times: PassTimes,
     /// Whether it was stopped before all planned trials were done.
     pub stopped: bool,
+}
+
+/// What [`render_rounds`] shows after each round.
+#[derive(Clone, Copy, Debug)]
+pub struct Round<'a> {
+    /// The image so far.
+    pub film: &'a Film,
+    /// Trials of each pixel and pass in it.
+    pub trials: u32,
+    /// Rays traced so far.
+    pub rays: RayCounts,
+    /// Time that threads spent in the passes so far.
+    pub times: PassTimes,
+}
+
+/// Renders with the same number of trials for every pixel in rounds that double it, from `min_trials` to `max_trials`, and shows
+/// `watch` the image after each; it says whether to go on. The image after `n` trials is the one that [`render()`] makes with fixed
+/// sampling of `n`, so one run gives the whole curve of error against time.
+pub fn render_rounds(
+    world: &World<'_>,
+    camera: &Camera,
+    params: &RenderParams,
+    progress: &Progress,
+    watch: &mut dyn FnMut(&Round<'_>) -> bool,
+) {
+    let mut renderer = Renderer::new(world, camera, params);
+    let mut film = Film::new(params.width, params.height);
+    let plan = renderer.everywhere(&film, params.max_trials);
+    let bar =
+        progress.stage("rendering", u64::from(params.max_trials) * u64::from(params.width) * u64::from(params.height));
+    renderer.rounds(&mut film, &plan, &|| progress.stopped(), &|n| bar.inc(n), watch);
+    bar.finish_and_clear();
 }
 
 /// Renders an image.
@@ -71,35 +106,30 @@ pub struct Rendering {
 /// A pilot estimates the variance around each tile and decides how many trials each pass gets there; its trials are thrown
 /// away. Deciding on trials that are kept would bias the image towards dark (see `docs/method.md`).
 pub fn render(world: &World<'_>, camera: &Camera, params: &RenderParams, progress: &Progress) -> Rendering {
-    let start = Instant::now();
-    let deadline = params.time_limit.map(|limit| start + limit);
+    let start = Stopwatch::start();
+    let deadline = params.time_limit.map(|limit| Instant::now() + limit);
     let over = || progress.stopped() || deadline.is_some_and(|d| Instant::now() >= d);
-    let mut renderer = Renderer { world, camera, params, rays: RayCounts::default(), times: PassTimes::default() };
+    let mut renderer = Renderer::new(world, camera, params);
 
     let mut film = Film::new(params.width, params.height);
     let plan = if params.min_trials == params.max_trials {
-        vec![Allocation { hires: params.min_trials, lores: params.min_trials }; film.tiles.len()]
+        renderer.everywhere(&film, params.min_trials)
     } else {
         let mut pilot = Film::new(params.width, params.height);
         let trials = plan::pilot_trials(params);
-        let all = vec![Allocation { hires: trials, lores: trials }; film.tiles.len()];
+        let all = renderer.everywhere(&pilot, trials);
         renderer.round(&mut pilot, &all, 0..trials, hash_all(&[params.seed, PILOT]), &over, &|_| {});
         plan::allocate(&pilot, params)
     };
 
     let planned: u64 = plan.iter().zip(&film.tiles).map(|(a, t)| u64::from(a.most()) * t.pixels.len() as u64).sum();
     let bar = progress.stage("rendering", planned);
-    let most = plan.iter().map(Allocation::most).max().unwrap_or(0);
-    let mut done = 0;
-    let mut stopped = false;
-    // Rounds double, so that there is a whole image early and prefixes of the point sets stay well distributed.
-    while done < most && !stopped {
-        let next = (2 * done).max(params.min_trials.max(1)).min(most);
-        stopped = renderer.round(&mut film, &plan, done..next, params.seed, &over, &|n| bar.inc(n));
-        done = next;
-    }
+    let stopped = renderer.rounds(&mut film, &plan, &over, &|n| bar.inc(n), &mut |_| true);
     bar.finish_and_clear();
-    Rendering { film, rays: renderer.rays, times: renderer.times.scaled_to(start.elapsed()), stopped }
+    let spent = start.spent();
+    let times = renderer.times.scaled_to(spent.wall_duration());
+    let cpu_times = renderer.times.scaled_to(spent.cpu_duration());
+    Rendering { film, rays: renderer.rays, times, cpu_times, stopped }
 }
 
 struct Renderer<'a> {
@@ -110,7 +140,41 @@ struct Renderer<'a> {
     times: PassTimes,
 }
 
-impl Renderer<'_> {
+impl<'a> Renderer<'a> {
+    fn new(world: &'a World<'a>, camera: &'a Camera, params: &'a RenderParams) -> Self {
+        Renderer { world, camera, params, rays: RayCounts::default(), times: PassTimes::default() }
+    }
+
+    /// The plan that gives every pixel the same number of trials.
+    fn everywhere(&self, film: &Film, trials: u32) -> Vec<Allocation> {
+        vec![Allocation { hires: trials, lores: trials }; film.tiles.len()]
+    }
+
+    /// Carries out a plan in rounds. They double, so that there is a whole image early and prefixes of the point sets stay well
+    /// distributed. Returns whether it was cut short.
+    fn rounds(
+        &mut self,
+        film: &mut Film,
+        plan: &[Allocation],
+        over: &(dyn Fn() -> bool + Sync),
+        advance: &(dyn Fn(u64) + Sync),
+        watch: &mut dyn FnMut(&Round<'_>) -> bool,
+    ) -> bool {
+        let most = plan.iter().map(Allocation::most).max().unwrap_or(0);
+        let mut done = 0;
+        while done < most {
+            let next = (2 * done).max(self.params.min_trials.max(1)).min(most);
+            if self.round(film, plan, done..next, self.params.seed, over, advance) {
+                return true;
+            }
+            done = next;
+            if !watch(&Round { film, trials: done, rays: self.rays, times: self.times }) {
+                break;
+            }
+        }
+        false
+    }
+
     /// Adds the trials with numbers in `range` to every tile whose allocation has them. Returns whether it was cut short.
     fn round(
         &mut self,

@@ -1,19 +1,23 @@
 //! A radiosity solution shown directly: what the camera sees of patches, without any gather.
 
+use std::time::Duration;
+
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::RenderParams;
 use super::film::Film;
-use super::integrator::{FarField, World};
+use super::integrator::{FarField, PassTimes, RayCounts, World};
+use super::{RenderParams, Rendering};
 use crate::backend::{Coherence, Hit, Ray, Visible};
+use crate::clock::Stopwatch;
 use crate::sampling::{hash_all, sobol};
 use crate::scene::Camera;
 use crate::shading::{Bsdf, Lobes, SurfacePoint};
 use crate::simplify::TriangleSource;
 
 /// Renders radiosity plus emission of the first surface of `far`, `min_trials` rays a pixel; everything goes to HIRES.
-pub fn show_radiosity(world: &World<'_>, far: &FarField<'_>, camera: &Camera, params: &RenderParams) -> Film {
+pub fn show_radiosity(world: &World<'_>, far: &FarField<'_>, camera: &Camera, params: &RenderParams) -> Rendering {
+    let start = Stopwatch::start();
     let mut film = Film::new(params.width, params.height);
     let size = Vec2::new(params.width as f32, params.height as f32);
     film.tiles.par_iter_mut().for_each(|tile| {
@@ -35,7 +39,16 @@ pub fn show_radiosity(world: &World<'_>, far: &FarField<'_>, camera: &Camera, pa
             tile.pixels[pixel].hires.add(radiance(world, far, ray, hit), trial & 1 == 0);
         }
     });
-    film
+    let spent = start.spent();
+    let all_hires = |total| PassTimes { hires: total, lores: Duration::ZERO };
+    let view = film.pixels().map(|p| u64::from(p.hires.trials())).sum();
+    Rendering {
+        film,
+        rays: RayCounts { view, ..RayCounts::default() },
+        times: all_hires(spent.wall_duration()),
+        cpu_times: all_hires(spent.cpu_duration()),
+        stopped: false,
+    }
 }
 
 fn radiance(world: &World<'_>, far: &FarField<'_>, ray: &Ray, hit: &Hit) -> Vec3 {

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use base64::Engine;
 use gsii::pipeline::{Prepared, Settings, Stats, choose_camera};
 use gsii::progress::Progress;
-use gsii::render::{self, Film, RenderParams, Rendering};
+use gsii::render::{Film, RenderParams, Rendering};
 use gsii::scene::{LoadOptions, Scene, load};
 use serde_json::{Value, json};
 use statrs::distribution::{ContinuousCDF, Normal};
@@ -138,7 +138,7 @@ pub fn prepare(scene: &Arc<Scene>, settings: Settings) -> (Prepared, Stats) {
 
 /// Renders from the first camera.
 pub fn render(prepared: &Prepared, params: &RenderParams) -> Rendering {
-    render::render(&prepared.world(), &prepared.scene.cameras[0], params, &Progress::silent())
+    prepared.render(&prepared.scene.cameras[0], params, &Progress::silent())
 }
 
 /// Radiance of every pixel and band.
