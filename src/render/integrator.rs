@@ -135,11 +135,15 @@ pub struct PassTimes {
 }
 
 impl PassTimes {
+    /// Share of HIRES, 0..=1.
+    pub fn hires_share(self) -> f64 {
+        let sum = (self.hires + self.lores).as_secs_f64();
+        if sum > 0.0 { self.hires.as_secs_f64() / sum } else { 0.0 }
+    }
+
     /// The same shares of another total.
     pub fn scaled_to(self, total: Duration) -> PassTimes {
-        let sum = (self.hires + self.lores).as_secs_f64();
-        let share = if sum > 0.0 { self.hires.as_secs_f64() / sum } else { 0.0 };
-        let hires = total.mul_f64(share);
+        let hires = total.mul_f64(self.hires_share());
         PassTimes { hires, lores: total - hires }
     }
 }
