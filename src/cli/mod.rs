@@ -5,6 +5,7 @@ pub mod info;
 pub mod options;
 pub mod render;
 pub mod simplify;
+pub mod study;
 pub mod validate;
 
 use std::process::ExitCode;
@@ -34,6 +35,8 @@ enum Command {
     Info(info::Options),
     /// Write the simplified scene and say how well it stands for the detailed one
     Simplify(simplify::Options),
+    /// Speed against error of all methods: tables, plots and one page that shows them
+    Study(study::Options),
     /// Compare Embree with obvhs, ray by ray, on a scene's own rays
     Validate(validate::Options),
     /// Error metrics of an image against a reference
@@ -55,6 +58,7 @@ pub fn run() -> ExitCode {
         Command::Render(options) => render::run(options),
         Command::Info(options) => info::run(options),
         Command::Simplify(options) => simplify::run(options),
+        Command::Study(options) => study::run(options),
         Command::Validate(options) => validate::run(options),
         Command::Compare(options) => compare::run(options),
     };

@@ -246,7 +246,8 @@ impl Options {
     }
 }
 
-fn stop_on_ctrl_c(progress: &crate::progress::Progress) {
+/// The first Ctrl-C ends the work at the next good moment, the second one at once.
+pub(super) fn stop_on_ctrl_c(progress: &crate::progress::Progress) {
     let progress = progress.clone();
     // Fails only when a handler exists already (several runs in one process): the first one stays.
     let _ = ctrlc::set_handler(move || {

@@ -208,12 +208,23 @@ pub fn simplify_only(
     settings.check()?;
     let backend = settings.backend.create(settings.threads)?;
     if settings.r_thresh.is_none() || settings.patch_size.is_none() {
-        let detailed = build_detailed(scene, backend.as_ref())?;
-        auto::fill_in(&mut settings, scene, detailed.as_ref(), camera);
+        settings = automatic(scene, camera, settings)?;
     }
     let simplified = simplify::simplify(scene, backend.as_ref(), &settings.simplify_params(), progress)?;
     stats.record_simplified(&simplified);
     Ok((simplified, settings))
+}
+
+/// Settings with every automatic choice filled in; nothing else is done.
+///
+/// # Errors
+/// Usage errors in the settings, backend failures.
+pub fn automatic(scene: &Arc<Scene>, camera: &Camera, mut settings: Settings) -> Result<Settings> {
+    settings.check()?;
+    let backend = settings.backend.create(settings.threads)?;
+    let detailed = build_detailed(scene, backend.as_ref())?;
+    auto::fill_in(&mut settings, scene, detailed.as_ref(), camera);
+    Ok(settings)
 }
 
 fn build_detailed(scene: &Arc<Scene>, backend: &dyn RayBackend) -> Result<Box<dyn RayScene>> {

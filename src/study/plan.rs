@@ -107,7 +107,8 @@ impl Run {
     /// Names what the run is a result of: two runs of the same key give the same result.
     pub fn key(&self, subject: &Subject) -> String {
         let settings = serde_json::Value::Object(self.settings.parameters());
-        key(&format!("{} {settings} {:?} {:?}", subject.view(), self.patches, self.sampling))
+        let what = (self.role, &self.label, self.patches, self.sampling);
+        key(&format!("{} {settings} {what:?}", subject.view()))
     }
 
     /// About what it costs, in trials of one pixel by path tracing: for the estimate of what is left to do.
@@ -137,12 +138,8 @@ impl fmt::Display for Role {
 pub fn ladder(subject: &Subject, base: &Settings, auto: f32, extent: Extent) -> Vec<Run> {
     let paper_r_thresh = PAPER_R_THRESH * subject.length();
     let gsii = Settings { method: Method::Gsii, ..base.clone() };
-    let paper_gsii = Settings {
-        r_thresh: Some(paper_r_thresh),
-        beta: PAPER_BETA,
-        box_fit: BoxFit::Paper1993,
-        ..gsii.clone()
-    };
+    let paper_gsii =
+        Settings { r_thresh: Some(paper_r_thresh), beta: PAPER_BETA, box_fit: BoxFit::Paper1993, ..gsii.clone() };
     let method = |method| Settings { method, ..base.clone() };
     let radiosity = |geometry| Settings { method: Method::Radiosity, geometry, ..paper_gsii.clone() };
 

@@ -128,7 +128,9 @@ impl Store {
     /// A finished run, where it is there and can be read.
     pub fn get(&self, key: &str) -> Option<Record> {
         let text = std::fs::read(self.file(key)).ok()?;
-        serde_json::from_slice(&text).inspect_err(|e| log::warn!("{}: {e}; it runs again", self.file(key).display())).ok()
+        serde_json::from_slice(&text)
+            .inspect_err(|e| log::warn!("{}: {e}; it runs again", self.file(key).display()))
+            .ok()
     }
 
     /// Keeps a finished run.

@@ -67,8 +67,7 @@ pub fn make(
         return Ok(reference);
     }
     let settings = Settings { method: Method::Mcpt, backend, ..Settings::default() };
-    let prepared =
-        Prepared::new(subject.scene.clone(), &subject.camera, settings, progress, &mut Stats::new())?;
+    let prepared = Prepared::new(subject.scene.clone(), &subject.camera, settings, progress, &mut Stats::new())?;
     let mut saved = std::time::Instant::now();
     while reference.trials < trials && !progress.stopped() {
         let params = RenderParams {

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::error::{Errors, Picture, compare};
-use super::plan::{Patches, PAPER_PATCHES, Run, Sampling};
+use super::plan::{PAPER_PATCHES, Patches, Run, Sampling};
 use super::record::{Point, Preparation, Record, Store};
 use super::subject::Subject;
 use crate::clock::{Spent, Stopwatch};
@@ -39,12 +39,14 @@ pub fn perform(
     for warning in &stats.warnings {
         log::info!("{}, {}: {warning}", subject.name, run.label);
     }
+    let mut parameters = stats.parameters.clone();
+    parameters.insert("pixels".to_owned(), (subject.size[0] * subject.size[1]).into());
     let mut record = Record {
         key,
         scene: subject.name.clone(),
         role: run.role,
         label: run.label.clone(),
-        parameters: stats.parameters.clone(),
+        parameters,
         threads: rayon::current_num_threads(),
         version: stats.version.to_owned(),
         triangles: stats.counts.triangles,
