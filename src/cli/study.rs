@@ -23,6 +23,9 @@ pub struct Options {
     /// Camera, by name or number (default: the first)
     #[arg(long, value_name = "NAME|INDEX")]
     camera: Option<String>,
+    /// Scenes on which only MCPT, PMM and GSII are compared, as they are by default; may be repeated
+    #[arg(long, value_name = "SCENE", num_args = 1..)]
+    curves: Vec<PathBuf>,
     /// Scenes of growing detail, for time against the number of triangles; may be repeated
     #[arg(long, value_name = "SCENE", num_args = 1..)]
     scaling: Vec<PathBuf>,
@@ -72,6 +75,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         &study::Options {
             scenes: options.scenes.clone(),
             camera: options.camera.clone(),
+            curves: options.curves.clone(),
             scaling: options.scaling.clone(),
             output: options.output.clone(),
             width: options.width,

@@ -129,13 +129,9 @@ impl Prepared {
         watch: &mut dyn FnMut(&Round<'_>) -> bool,
     ) {
         if self.settings.method == Method::Radiosity {
-            let rendering = self.render(camera, params, progress);
-            watch(&Round {
-                film: &rendering.film,
-                trials: params.min_trials,
-                rays: rendering.rays,
-                times: rendering.times,
-            });
+            let trials = params.max_trials;
+            let rendering = self.render(camera, &RenderParams { min_trials: trials, ..params.clone() }, progress);
+            watch(&Round { film: &rendering.film, trials, rays: rendering.rays, times: rendering.times });
         } else {
             render::render_rounds(&self.world(), camera, params, progress, watch);
         }

@@ -34,6 +34,8 @@ use subject::Subject;
 pub struct Options {
     /// Scenes that are compared with a reference.
     pub scenes: Vec<PathBuf>,
+    /// Scenes on which only MCPT, PMM and GSII are compared, as they are by default.
+    pub curves: Vec<PathBuf>,
     /// Camera by name or number; the first where there is none.
     pub camera: Option<String>,
     /// Scenes of growing detail, for the scaling with the number of triangles.
@@ -128,13 +130,17 @@ pub fn run(options: &Options, progress: &Progress, say: &dyn Fn(&str)) -> Result
     record::make_folder(&folder("references"))?;
 
     let mut plans = Vec::new();
+    let extent = Extent { main_trials: options.main_trials, other_trials: options.other_trials };
     for path in &options.scenes {
         let subject = Subject::load(path, options.camera.as_deref(), options.width)?;
         let gsii = Settings { method: Method::Gsii, ..options.base.clone() };
         let auto = pipeline::automatic(&subject.scene, &subject.camera, gsii)?.r_thresh();
-        let extent = Extent { main_trials: options.main_trials, other_trials: options.other_trials };
         let runs = plan::ladder(&subject, &options.base, auto, extent);
         plans.push((subject, runs));
+    }
+    for path in &options.curves {
+        let subject = Subject::load(path, options.camera.as_deref(), options.width)?;
+        plans.push((subject, plan::main_methods(&options.base, extent)));
     }
     let mut scaling_subjects = Vec::new();
     for path in &options.scaling {

@@ -13,8 +13,8 @@ use crate::simplify::BoxFit;
 pub const PAPER_R_THRESH: f32 = 0.053;
 /// The paper's beta.
 pub const PAPER_BETA: f32 = 1.0 / TAU;
-/// The paper's numbers of patches: normal + simple, normal + complex.
-pub const PAPER_PATCHES: [usize; 2] = [1124, 74_924];
+/// The paper's numbers of surfaces and patches: normal + simple, normal + complex.
+pub const PAPER_PATCHES: [(usize, usize); 2] = [(105, 1124), (10_948, 74_924)];
 
 /// What a run is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -40,6 +40,8 @@ pub enum Role {
     PaperPmm,
     /// The radiosity solution on normal + simple surfaces, shown directly; the paper's parameters.
     RadiositySimple,
+    /// The same with as few patches as the paper's: our rules keep more surfaces than the paper's hand did.
+    RadiosityFewPatches,
     /// The same on normal + complex surfaces.
     RadiosityComplex,
     /// One of the paper's timings: its stopping rule, for Tables 2 and 3.
@@ -72,8 +74,10 @@ pub enum Sampling {
 pub enum Patches {
     /// As the settings say.
     Auto,
-    /// The paper's number for the geometry that radiosity is solved on.
-    Paper,
+    /// As many for each surface as in the paper.
+    PaperShare,
+    /// As many as in the paper.
+    PaperCount,
 }
 
 /// One run.
@@ -134,6 +138,20 @@ impl fmt::Display for Role {
     }
 }
 
+/// MCPT, PMM and GSII as they are by default.
+pub fn main_methods(base: &Settings, extent: Extent) -> Vec<Run> {
+    [(Role::Gsii, Method::Gsii, "GSII"), (Role::Mcpt, Method::Mcpt, "MCPT"), (Role::Pmm, Method::Pmm, "PMM")]
+        .into_iter()
+        .map(|(role, method, label)| Run {
+            role,
+            label: label.to_owned(),
+            settings: Settings { method, ..base.clone() },
+            patches: Patches::Auto,
+            sampling: Sampling::Rounds { most: extent.main_trials, rel_mse: ENOUGH },
+        })
+        .collect()
+}
+
 /// All runs of one scene whose automatic `r_thresh` is `auto`.
 pub fn ladder(subject: &Subject, base: &Settings, auto: f32, extent: Extent) -> Vec<Run> {
     let paper_r_thresh = PAPER_R_THRESH * subject.length();
@@ -143,16 +161,12 @@ pub fn ladder(subject: &Subject, base: &Settings, auto: f32, extent: Extent) -> 
     let method = |method| Settings { method, ..base.clone() };
     let radiosity = |geometry| Settings { method: Method::Radiosity, geometry, ..paper_gsii.clone() };
 
-    let main = Sampling::Rounds { most: extent.main_trials, rel_mse: ENOUGH };
     let other = Sampling::Rounds { most: extent.other_trials, rel_mse: 0.0 };
     let shown = Sampling::Rounds { most: 16, rel_mse: 0.0 };
-    let mut runs = Vec::new();
+    let mut runs = main_methods(base, extent);
     let mut add = |role, label: &str, settings: Settings, patches, sampling| {
         runs.push(Run { role, label: label.to_owned(), settings, patches, sampling });
     };
-    add(Role::Gsii, "GSII", gsii.clone(), Patches::Auto, main);
-    add(Role::Mcpt, "MCPT", method(Method::Mcpt), Patches::Auto, main);
-    add(Role::Pmm, "PMM", method(Method::Pmm), Patches::Auto, main);
     for factor in [0.5, 2.0, 4.0] {
         let settings = Settings { r_thresh: Some(factor * auto), ..gsii.clone() };
         add(Role::RThresh, &format!("GSII, r_thresh x {factor}"), settings, Patches::Auto, other);
@@ -161,29 +175,24 @@ pub fn ladder(subject: &Subject, base: &Settings, auto: f32, extent: Extent) -> 
         add(Role::Beta, &format!("GSII, beta {name}"), Settings { beta, ..gsii.clone() }, Patches::Auto, other);
     }
     let boxes = Settings { box_fit: BoxFit::Paper1993, ..gsii.clone() };
-    add(Role::Box, "GSII, the paper's boxes", boxes, Patches::Auto, other);
+    add(Role::Box, "GSII, paper's boxes", boxes, Patches::Auto, other);
     let at_paper = Settings { r_thresh: Some(paper_r_thresh), ..gsii.clone() };
-    add(Role::AtPaperRThresh, "GSII, the paper's r_thresh", at_paper, Patches::Auto, other);
-    add(Role::PaperGsii, "GSII, all of the paper's parameters", paper_gsii.clone(), Patches::Paper, other);
-    add(Role::PaperPmm, "PMM, the paper's patches", method(Method::Pmm), Patches::Paper, other);
-    add(Role::RadiositySimple, "Radiosity, N+S", radiosity(GeometryKind::Ns), Patches::Paper, shown);
-    add(Role::RadiosityComplex, "Radiosity, N+C", radiosity(GeometryKind::Nc), Patches::Paper, shown);
+    add(Role::AtPaperRThresh, "GSII, paper's r_thresh", at_paper, Patches::Auto, other);
+    add(Role::PaperGsii, "GSII, as in the paper", paper_gsii.clone(), Patches::PaperShare, other);
+    add(Role::PaperPmm, "PMM, as in the paper", method(Method::Pmm), Patches::PaperShare, other);
+    add(Role::RadiositySimple, "Radiosity, N+S", radiosity(GeometryKind::Ns), Patches::PaperShare, shown);
+    let few = radiosity(GeometryKind::Ns);
+    add(Role::RadiosityFewPatches, "Radiosity, N+S, few patches", few, Patches::PaperCount, shown);
+    add(Role::RadiosityComplex, "Radiosity, N+C", radiosity(GeometryKind::Nc), Patches::PaperShare, shown);
     add(Role::PassMcpt, "MCPT", method(Method::Mcpt), Patches::Auto, Sampling::Paper);
-    add(Role::PassPmm, "PMM", method(Method::Pmm), Patches::Paper, Sampling::Paper);
-    add(Role::PassGsii, "GSII", paper_gsii, Patches::Paper, Sampling::Paper);
+    add(Role::PassPmm, "PMM", method(Method::Pmm), Patches::PaperShare, Sampling::Paper);
+    add(Role::PassGsii, "GSII", paper_gsii, Patches::PaperShare, Sampling::Paper);
     runs
 }
 
 /// The runs of one scene in the scaling with the number of triangles.
 pub fn scaling(base: &Settings) -> Vec<Run> {
-    [(Method::Gsii, "GSII"), (Method::Mcpt, "MCPT"), (Method::Pmm, "PMM")]
-        .into_iter()
-        .map(|(method, label)| Run {
-            role: Role::Scaling,
-            label: label.to_owned(),
-            settings: Settings { method, ..base.clone() },
-            patches: Patches::Auto,
-            sampling: Sampling::Rounds { most: 16, rel_mse: 0.0 },
-        })
-        .collect()
+    let sampling = Sampling::Rounds { most: 16, rel_mse: 0.0 };
+    let extent = Extent { main_trials: 16, other_trials: 16 };
+    main_methods(base, extent).into_iter().map(|run| Run { role: Role::Scaling, sampling, ..run }).collect()
 }

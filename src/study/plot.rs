@@ -269,7 +269,10 @@ fn draw_bars(svg: &mut String, bars: &Bars, reach: f64, size: (u32, u32)) -> Res
             .x_desc(bars.x.clone())
             .axis_desc_style(text(25))
             .label_style(text(23))
-            .x_label_formatter(&|v| format!("{:+}", (v * 1e6).round() / 1e6))
+            .x_label_formatter(&|v| match (v * 1e6).round() / 1e6 {
+                0.0 => "0".to_owned(),
+                v => format!("{v:+}"),
+            })
             .y_label_formatter(&name)
             .draw()?;
         context.draw_series(LineSeries::new([(0.0, 0.0), (0.0, n)], INK.mix(0.8).stroke_width(2)))?;

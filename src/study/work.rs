@@ -14,7 +14,7 @@ use crate::progress::Progress;
 use crate::radiosity;
 use crate::render::film::PixelSum;
 use crate::render::{Film, RayCounts, RenderParams};
-use crate::simplify::SimplifiedGeometry;
+use crate::simplify::{Class, SimplifiedGeometry};
 
 /// Keeps the images apart from the default seed's, which everybody looks at.
 const SEED: u32 = 1993;
@@ -120,7 +120,13 @@ fn with_patches(run: &Run, subject: &Subject, progress: &Progress) -> Result<Set
         simplified.geometry
     };
     let clusters = if complete { &[][..] } else { &simplified.clusters };
-    let target = PAPER_PATCHES[usize::from(complete)];
+    let (paper_surfaces, paper_patches) = PAPER_PATCHES[usize::from(complete)];
+    let kept = |s: &crate::simplify::Surface| complete || s.class == Class::Normal;
+    let surfaces = simplified.surfaces.iter().filter(|s| kept(s)).count() + 6 * clusters.len();
+    let target = match run.patches {
+        Patches::PaperShare => (paper_patches as f64 / paper_surfaces as f64 * surfaces as f64) as usize,
+        _ => paper_patches,
+    };
     let mut radiosity = filled.radiosity_params();
     let mut bounds = [1e-3 * subject.length(), subject.length()];
     // Fewer patches for larger sizes: 20 halvings of the range of logarithms.
