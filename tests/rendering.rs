@@ -5,6 +5,9 @@
 
 mod common;
 
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
 use common::{Estimate, cluttered_room, fixed, gltf, lit_room, prepare, render, scene, threshold, values};
 use gsii::pipeline::{BackendKind, Method, Settings};
 use gsii::render::{RenderParams, bias};
@@ -76,6 +79,60 @@ fn with_an_endless_near_field_gsii_is_path_tracing() {
     let mcpt = image(with(Method::Mcpt), &params);
     assert_eq!(bits(&gsii), bits(&mcpt));
     assert_ne!(bits(&gsii), bits(&image(with(Method::Pmm), &params)), "PMM is another method");
+}
+
+/// Scenes on which the limits of the method are checked: (name, file); those that are not at hand are left out.
+fn real_scenes() -> Vec<(&'static str, PathBuf)> {
+    let office = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/office-high.glb");
+    let shared = common::shared().map(|folder| folder.join("scenes"));
+    let others = ["cornell", "clutter"].map(|name| Some((name, shared.as_ref()?.join(format!("{name}.glb")))));
+    others.into_iter().flatten().chain([("office", office)]).collect()
+}
+
+#[test]
+fn the_limits_are_pmm_and_path_tracing_bit_for_bit_in_real_scenes() {
+    let params = fixed(24, 16, 4, 1);
+    for (name, path) in real_scenes() {
+        let scene = Arc::new(gsii::scene::load(&path, &Default::default()).unwrap());
+        let image = |settings: Settings| bits(&values(&render(&prepare(&scene, settings).0, &params).film));
+        for (r_thresh, method) in [(0.0, Method::Pmm), (f32::INFINITY, Method::Mcpt)] {
+            let gsii = image(Settings { r_thresh: Some(r_thresh), ..with(Method::Gsii) });
+            assert!(gsii == image(with(method)), "{name}: r_thresh {r_thresh} is not {method:?}");
+        }
+    }
+}
+
+/// `r_thresh` far larger than the scene: the far field is there and every ray asks it, but all light is found nearby. Pixel by pixel this
+/// must be path tracing, as far as other random numbers can tell: no pixel and band may be off by more than the largest of as many normal
+/// deviates is with probability [`ALPHA`].
+#[test]
+fn a_near_field_larger_than_the_scene_is_path_tracing_pixel_by_pixel() {
+    let (width, height, trials) = (36, 24, 256);
+    for (name, path) in real_scenes() {
+        let scene = Arc::new(gsii::scene::load(&path, &Default::default()).unwrap());
+        let r_thresh = Some(4.0 * scene.mesh.bounds.diagonal());
+        let (gsii, _) = prepare(&scene, Settings { r_thresh, ..with(Method::Gsii) });
+        assert!(gsii.far.is_some(), "the far field is there");
+        let (mcpt, _) = prepare(&scene, with(Method::Mcpt));
+        let a = render(&gsii, &fixed(width, height, trials, 31)).film;
+        let b = render(&mcpt, &fixed(width, height, trials, 32)).film;
+        let limit = threshold(ALPHA, 3 * 3 * (width * height) as usize);
+        let mut worst = 0.0f64;
+        for (i, (a, b)) in a.pixels().zip(b.pixels()).enumerate() {
+            for band in 0..3 {
+                let mean = |p: &gsii::render::film::Pixel| p.hires.mean()[band] + p.lores.mean()[band];
+                // Trials as if independent, passes as if fully correlated: an upper estimate of the error.
+                let dev = |p: &gsii::render::film::Pixel| p.hires.dev()[band] + p.lores.dev()[band];
+                let difference = (mean(a) - mean(b)).abs();
+                let z = if difference <= 1e-6 * mean(b) { 0.0 } else { difference / dev(a).hypot(dev(b)) };
+                worst = worst.max(z);
+                assert!(z < limit, "{name}: pixel {i}, band {band}: {} and {}, z {z:.2}", mean(a), mean(b));
+            }
+        }
+        let (a, b) = (Estimate::whole(&a), Estimate::whole(&b));
+        println!("{name}: largest z of a pixel {worst:.2} of {limit:.2}; means {a:?} {b:?}, z {:.2}", a.z(b));
+        assert!(a.z(b).abs() < threshold(ALPHA, 3), "{name}: {a:?} {b:?}");
+    }
 }
 
 /// Inside a closed room whose walls emit `radiance` and reflect `rho`, radiance is the same everywhere, `radiance / (1 - rho)`;

@@ -24,9 +24,9 @@ use std::time::Instant;
 use crate::error::Result;
 use crate::pipeline::{self, Method, Settings};
 use crate::progress::Progress;
-use error::Picture;
 use plan::{Extent, Role, Run};
 use record::{Record, Store};
+use reference::Reference;
 use subject::Subject;
 
 /// What to study.
@@ -61,9 +61,7 @@ pub struct Chapter {
     /// The scene.
     pub subject: Subject,
     /// Its reference.
-    pub reference: Picture,
-    /// Trials of each pixel in that.
-    pub reference_trials: u32,
+    pub reference: Reference,
     /// Finished runs, in the ladder's order.
     pub records: Vec<Record>,
 }
@@ -176,12 +174,10 @@ pub fn run(options: &Options, progress: &Progress, say: &dyn Fn(&str)) -> Result
         if progress.stopped() {
             return Ok(false);
         }
-        let picture = Some(&reference.picture);
-        let Some(records) = carry_out(&runs, &subject, picture, &study.store, progress, &mut pace)? else {
+        let Some(records) = carry_out(&runs, &subject, Some(&reference), &study.store, progress, &mut pace)? else {
             return Ok(false);
         };
-        let (reference, reference_trials) = (reference.picture, reference.trials);
-        study.chapters.push(Chapter { subject, reference, reference_trials, records });
+        study.chapters.push(Chapter { subject, reference, records });
     }
     for subject in scaling_subjects {
         match carry_out(&scaling_runs, &subject, None, &study.store, progress, &mut pace)? {
@@ -199,7 +195,7 @@ pub fn run(options: &Options, progress: &Progress, say: &dyn Fn(&str)) -> Result
 fn carry_out(
     runs: &[Run],
     subject: &Subject,
-    reference: Option<&Picture>,
+    reference: Option<&Reference>,
     store: &Store,
     progress: &Progress,
     pace: &mut Pace<'_>,
@@ -207,7 +203,7 @@ fn carry_out(
     let mut records = Vec::new();
     for run in runs {
         let cost = run.cost(subject);
-        if let Some(record) = store.get(&run.key(subject)) {
+        if let Some(record) = store.get(&run.key(subject, reference.map_or(0, |r| r.trials))) {
             pace.skip(cost);
             records.push(record);
             continue;

@@ -108,10 +108,10 @@ pub struct Extent {
 const ENOUGH: f64 = 7e-4;
 
 impl Run {
-    /// Names what the run is a result of: two runs of the same key give the same result.
-    pub fn key(&self, subject: &Subject) -> String {
+    /// Names what the run is a result of, compared with a reference of so many trials: two runs of the same key give the same result.
+    pub fn key(&self, subject: &Subject, reference_trials: u32) -> String {
         let settings = serde_json::Value::Object(self.settings.parameters());
-        let what = (self.role, &self.label, self.patches, self.sampling);
+        let what = (self.role, &self.label, self.patches, self.sampling, reference_trials);
         key(&format!("{} {settings} {what:?}", subject.view()))
     }
 

@@ -72,7 +72,7 @@ fn numbers(study: &Study) -> String {
                 "name": c.subject.name,
                 "average_reflectance": c.subject.reflectance,
                 "size": c.subject.size,
-                "reference_trials": c.reference_trials,
+                "reference_trials": c.reference.trials,
                 "runs": c.records,
             })
         })
@@ -135,7 +135,7 @@ fn facts(chapter: &Chapter) -> String {
         subject.reflectance,
         subject.size[0],
         subject.size[1],
-        chapter.reference_trials
+        chapter.reference.trials
     )
 }
 
@@ -163,7 +163,7 @@ struct Album<'a> {
 
 impl<'a> Album<'a> {
     fn new(study: &'a Study, chapter: &'a Chapter, output: &Path) -> Result<Album<'a>> {
-        let reference = chapter.reference.whole.mean();
+        let reference = chapter.reference.picture.whole.mean();
         let exposure = pictures::exposure(chapter.subject.size[0], &reference);
         Ok(Album { study, chapter, folder: output.join("images"), exposure, reference })
     }
@@ -187,7 +187,7 @@ impl<'a> Album<'a> {
     fn reference(&self) -> Result<Figure> {
         Ok(Figure {
             title: "Reference".to_owned(),
-            caption: format!("MCPT, {} trials", self.chapter.reference_trials),
+            caption: format!("MCPT, {} trials", self.chapter.reference.trials),
             image: self.photograph("reference", &self.reference)?,
             difference: None,
         })
@@ -216,7 +216,7 @@ impl<'a> Album<'a> {
         let truth: super::error::Plane = self
             .reference
             .iter()
-            .zip(&self.chapter.reference.indirect.mean())
+            .zip(&self.chapter.reference.picture.indirect.mean())
             .map(|(w, l)| std::array::from_fn(|c| w[c] - l[c]))
             .collect();
         let path = self.path("direct-difference");

@@ -5,6 +5,7 @@ use std::path::Path;
 use super::error::{Errors, Picture, compare};
 use super::plan::{PAPER_PATCHES, Patches, Run, Sampling};
 use super::record::{Point, Preparation, Record, Store};
+use super::reference::Reference;
 use super::subject::Subject;
 use crate::clock::{Spent, Stopwatch};
 use crate::error::Result;
@@ -26,12 +27,12 @@ const SEED: u32 = 1993;
 pub fn perform(
     run: &Run,
     subject: &Subject,
-    reference: Option<&Picture>,
+    reference: Option<&Reference>,
     store: &Store,
     progress: &Progress,
 ) -> Result<Option<Record>> {
     let settings = with_patches(run, subject, progress)?;
-    let key = run.key(subject);
+    let key = run.key(subject, reference.map_or(0, |r| r.trials));
     let mut stats = Stats::new();
     let watch = Stopwatch::start();
     let prepared = Prepared::new(subject.scene.clone(), &subject.camera, settings, progress, &mut stats)?;
@@ -53,7 +54,7 @@ pub fn perform(
         preparation: preparation(&prepared, &stats, all),
         points: Vec::new(),
     };
-    let keep = Keep { store, subject, reference };
+    let keep = Keep { store, subject, reference: reference.map(|r| &r.picture) };
     match run.sampling {
         Sampling::Rounds { most, rel_mse } => {
             let mut failed = None;
