@@ -124,9 +124,9 @@ impl Run {
         };
         let (trial, preparation) = match self.settings.method {
             Method::Mcpt => (1.0, 0.0),
-            Method::Gsii => (0.6, 1.5e6),
-            Method::Pmm => (0.5, 2.5e6),
-            Method::Radiosity => (0.1, 2e6),
+            Method::Gsii => (0.6, 5e5),
+            Method::Pmm => (0.5, 8e5),
+            Method::Radiosity => (0.1, 8e5),
         };
         (pixels * trials * trial + preparation) as u64
     }
