@@ -33,7 +33,7 @@ pub struct Options {
     #[arg(long, value_name = "N", default_value_t = 240)]
     width: u32,
     /// Trials of each pixel of the path-traced references
-    #[arg(long, value_name = "N", default_value_t = 2048)]
+    #[arg(long, value_name = "N", default_value_t = 1024)]
     reference_trials: u32,
     /// Most trials of each pixel of MCPT, PMM and GSII as they are by default
     #[arg(long, value_name = "N", default_value_t = 512)]

@@ -201,6 +201,7 @@ fn carry_out(
     pace: &mut Pace<'_>,
 ) -> Result<Option<Vec<Record>>> {
     let mut records = Vec::new();
+    let mut kit = None;
     for run in runs {
         let cost = run.cost(subject);
         if let Some(record) = store.get(&run.key(subject, reference.map_or(0, |r| r.trials))) {
@@ -208,7 +209,7 @@ fn carry_out(
             records.push(record);
             continue;
         }
-        let Some(record) = work::perform(run, subject, reference, store, &progress.quietly())? else {
+        let Some(record) = work::perform(run, subject, reference, store, &mut kit, &progress.quietly())? else {
             return Ok(None);
         };
         store.put(&record)?;

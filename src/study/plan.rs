@@ -115,6 +115,12 @@ impl Run {
         key(&format!("{} {settings} {what:?}", subject.view()))
     }
 
+    /// Names what the scene is prepared for: runs with the same name differ in their trials only.
+    pub fn preparation_key(&self, subject: &Subject) -> String {
+        let settings = serde_json::Value::Object(self.settings.parameters());
+        key(&format!("{} {settings} {:?}", subject.view(), self.patches))
+    }
+
     /// About what it costs, in trials of one pixel by path tracing: for the estimate of what is left to do.
     pub fn cost(&self, subject: &Subject) -> u64 {
         let pixels = f64::from(subject.size[0]) * f64::from(subject.size[1]);
@@ -159,7 +165,8 @@ pub fn ladder(subject: &Subject, base: &Settings, auto: f32, extent: Extent) -> 
     let paper_gsii =
         Settings { r_thresh: Some(paper_r_thresh), beta: PAPER_BETA, box_fit: BoxFit::Paper1993, ..gsii.clone() };
     let method = |method| Settings { method, ..base.clone() };
-    let radiosity = |geometry| Settings { method: Method::Radiosity, geometry, ..paper_gsii.clone() };
+    let for_radiosity = paper_gsii.clone();
+    let radiosity = |geometry| Settings { method: Method::Radiosity, geometry, ..for_radiosity.clone() };
 
     let other = Sampling::Rounds { most: extent.other_trials, rel_mse: 0.0 };
     let shown = Sampling::Rounds { most: 16, rel_mse: 0.0 };
@@ -178,15 +185,17 @@ pub fn ladder(subject: &Subject, base: &Settings, auto: f32, extent: Extent) -> 
     add(Role::Box, "GSII, paper's boxes", boxes, Patches::Auto, other);
     let at_paper = Settings { r_thresh: Some(paper_r_thresh), ..gsii.clone() };
     add(Role::AtPaperRThresh, "GSII, paper's r_thresh", at_paper, Patches::Auto, other);
-    add(Role::PaperGsii, "GSII, as in the paper", paper_gsii.clone(), Patches::PaperShare, other);
-    add(Role::PaperPmm, "PMM, as in the paper", method(Method::Pmm), Patches::PaperShare, other);
-    add(Role::RadiositySimple, "Radiosity, N+S", radiosity(GeometryKind::Ns), Patches::PaperShare, shown);
+    // Runs that differ in their trials only come one after the other: they are prepared once.
+    let share = Patches::PaperShare;
+    add(Role::PaperGsii, "GSII, as in the paper", paper_gsii.clone(), share, other);
+    add(Role::PassGsii, "GSII", paper_gsii, share, Sampling::Paper);
+    add(Role::PaperPmm, "PMM, as in the paper", method(Method::Pmm), share, other);
+    add(Role::PassPmm, "PMM", method(Method::Pmm), share, Sampling::Paper);
+    add(Role::PassMcpt, "MCPT", method(Method::Mcpt), Patches::Auto, Sampling::Paper);
+    add(Role::RadiositySimple, "Radiosity, N+S", radiosity(GeometryKind::Ns), share, shown);
     let few = radiosity(GeometryKind::Ns);
     add(Role::RadiosityFewPatches, "Radiosity, N+S, few patches", few, Patches::PaperCount, shown);
-    add(Role::RadiosityComplex, "Radiosity, N+C", radiosity(GeometryKind::Nc), Patches::PaperShare, shown);
-    add(Role::PassMcpt, "MCPT", method(Method::Mcpt), Patches::Auto, Sampling::Paper);
-    add(Role::PassPmm, "PMM", method(Method::Pmm), Patches::PaperShare, Sampling::Paper);
-    add(Role::PassGsii, "GSII", paper_gsii, Patches::PaperShare, Sampling::Paper);
+    add(Role::RadiosityComplex, "Radiosity, N+C", radiosity(GeometryKind::Nc), share, shown);
     runs
 }
 

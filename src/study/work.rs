@@ -20,7 +20,31 @@ use crate::simplify::{Class, SimplifiedGeometry};
 /// Keeps the images apart from the default seed's, which everybody looks at.
 const SEED: u32 = 1993;
 
-/// Carries a run out. `None` when it was stopped before it was finished.
+/// A scene, prepared for a run: kept for the next one, which may differ in its trials only.
+pub struct Kit {
+    /// Names what it is prepared for.
+    key: String,
+    prepared: Prepared,
+    stats: Stats,
+    all: Spent,
+}
+
+impl Kit {
+    fn new(key: String, run: &Run, subject: &Subject, progress: &Progress) -> Result<Kit> {
+        let settings = with_patches(run, subject, progress)?;
+        let mut stats = Stats::new();
+        let watch = Stopwatch::start();
+        let prepared = Prepared::new(subject.scene.clone(), &subject.camera, settings, progress, &mut stats)?;
+        let all = watch.spent();
+        for warning in &stats.warnings {
+            log::info!("{}, {}: {warning}", subject.name, run.label);
+        }
+        Ok(Kit { key, prepared, stats, all })
+    }
+}
+
+/// Carries a run out. `None` when it was stopped before it was finished. `kit` is what the run before was prepared with, and what
+/// this one is.
 ///
 /// # Errors
 /// As preparing a scene; images that cannot be written.
@@ -29,17 +53,17 @@ pub fn perform(
     subject: &Subject,
     reference: Option<&Reference>,
     store: &Store,
+    kit: &mut Option<Kit>,
     progress: &Progress,
 ) -> Result<Option<Record>> {
-    let settings = with_patches(run, subject, progress)?;
+    let preparation_key = run.preparation_key(subject);
+    // What was there is given up before its successor needs the memory.
+    let fitting = kit.take().filter(|kit| kit.key == preparation_key);
+    let Kit { prepared, stats, all, .. } = match fitting {
+        Some(fitting) => kit.insert(fitting),
+        None => kit.insert(Kit::new(preparation_key, run, subject, progress)?),
+    };
     let key = run.key(subject, reference.map_or(0, |r| r.trials));
-    let mut stats = Stats::new();
-    let watch = Stopwatch::start();
-    let prepared = Prepared::new(subject.scene.clone(), &subject.camera, settings, progress, &mut stats)?;
-    let all = watch.spent();
-    for warning in &stats.warnings {
-        log::info!("{}, {}: {warning}", subject.name, run.label);
-    }
     let mut parameters = stats.parameters.clone();
     parameters.insert("pixels".to_owned(), (subject.size[0] * subject.size[1]).into());
     let mut record = Record {
@@ -51,7 +75,7 @@ pub fn perform(
         threads: rayon::current_num_threads(),
         version: stats.version.to_owned(),
         triangles: stats.counts.triangles,
-        preparation: preparation(&prepared, &stats, all),
+        preparation: preparation(prepared, stats, *all),
         points: Vec::new(),
     };
     let keep = Keep { store, subject, reference: reference.map(|r| &r.picture) };
