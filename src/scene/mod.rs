@@ -13,6 +13,7 @@ pub mod material;
 pub mod mesh;
 mod overview;
 mod pane;
+pub mod plane;
 #[cfg(test)]
 mod tests;
 pub mod texture;
@@ -22,11 +23,12 @@ use glam::DVec3;
 pub use aabb::Aabb;
 pub use alpha::AlphaFilter;
 pub use builder::{GeometryId, MeshData, SceneBuilder};
-pub use camera::{Camera, Projection};
+pub use camera::{Camera, Lens, Projection};
 pub use gltf::{LoadOptions, load};
 pub use light::{LightKind, PunctualLight};
 pub use material::{Alpha, Material, TextureSlot};
 pub use mesh::{Mesh, Object};
+pub use plane::Plane;
 pub use texture::{Texels, Texture, Wrap};
 
 /// A complete scene in recentred world coordinates (metres unless the file says otherwise, y up).
