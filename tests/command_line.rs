@@ -371,3 +371,60 @@ fn validate_finds_no_unexplained_difference() {
     refused(&bench.gsii(&["validate", "room.gltf", "--rays", "0"]), &["--rays"]);
     refused(&bench.gsii(&["validate", "room.gltf", "--r-thresh", "inf"]), &["--r-thresh"]);
 }
+
+/// Names of all files below a folder, and when they were written.
+fn written(folder: &Path) -> Vec<(PathBuf, std::time::SystemTime)> {
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(folder).unwrap().map(Result::unwrap) {
+        if entry.path().is_dir() {
+            files.extend(written(&entry.path()));
+        } else {
+            files.push((entry.path(), entry.metadata().unwrap().modified().unwrap()));
+        }
+    }
+    files.sort();
+    files
+}
+
+#[test]
+fn a_study_goes_on_where_it_was_and_writes_its_report() {
+    let bench = Bench::new();
+    let small = ["--width", "16", "--reference-trials", "64", "--max-trials", "4", "--other-trials", "2"];
+    let arguments = [&["study", "room.gltf", "--scaling", "room.gltf", "-o", "report"], &small[..]].concat();
+    let mut child = bench.command(&arguments).stderr(Stdio::null()).spawn().unwrap();
+    let runs = bench.path("report/work/runs");
+    let deadline = Instant::now() + Duration::from_secs(300);
+    let finished =
+        || runs.is_dir() && written(&runs).iter().any(|(path, _)| path.extension().is_some_and(|e| e == "json"));
+    while !finished() && child.try_wait().unwrap().is_none() {
+        assert!(Instant::now() < deadline, "no run was finished");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    interrupt(&child);
+    child.wait().unwrap();
+    let json = |files: Vec<(PathBuf, std::time::SystemTime)>| -> Vec<_> {
+        files.into_iter().filter(|(path, _)| path.extension().is_some_and(|e| e == "json")).collect()
+    };
+    let before = json(written(&runs));
+    assert!(!before.is_empty());
+
+    let output = bench.gsii(&arguments);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let after = json(written(&runs));
+    assert!(before.iter().all(|file| after.contains(file)), "finished runs are kept");
+
+    let page = std::fs::read_to_string(bench.path("report/index.html")).unwrap();
+    assert!(page.contains("Table 4") && page.contains("data:image/jpeg") && page.contains("<svg"));
+    for reference in ["src=\"http", "href=\"http", "url(http", "@import"] {
+        assert!(!page.contains(reference), "the page asks for nothing: {reference}");
+    }
+    for table in ["table-1", "table-2", "table-3", "table-4", "crossings", "settings", "scaling"] {
+        let csv = std::fs::read_to_string(bench.path(&format!("report/tables/{table}.csv"))).unwrap();
+        assert!(csv.lines().count() >= 2, "{table} has rows: {csv}");
+    }
+    let study: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(bench.path("report/study.json")).unwrap()).unwrap();
+    let runs = study["scenes"][0]["runs"].as_array().unwrap();
+    let error = |role: &str| runs.iter().find(|r| r["role"] == role).unwrap()["points"][0]["whole"]["rel_mse"].as_f64();
+    assert!(error("mcpt").is_some_and(|e| e > 0.0) && error("radiosity-simple").is_some_and(|e| e > 0.0));
+}
