@@ -81,6 +81,8 @@ pub struct Captured {
     pub normal: Vec3,
     /// Whether any part of the surface is diffuse.
     pub diffuse: bool,
+    /// Of the angle at which the surface is seen.
+    pub cosine: f32,
 }
 
 /// Where radiance beyond `r_thresh` comes from.
@@ -532,7 +534,8 @@ impl<'a> World<'a> {
         match (path.gathers, capture) {
             (false, Some(captured)) => {
                 let diffuse = bsdf.albedo_diffuse() != Vec3::ZERO;
-                captured.push(Captured { path: next, point, normal: facing, diffuse });
+                let cosine = outgoing.dot(point.geometric_normal).abs();
+                captured.push(Captured { path: next, point, normal: facing, diffuse, cosine });
             }
             _ => ws.next.push(next),
         }
