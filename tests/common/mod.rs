@@ -129,6 +129,11 @@ pub fn fixed(width: u32, height: u32, trials: u32, seed: u32) -> RenderParams {
     }
 }
 
+/// As [`fixed`], with indirect light interpolated.
+pub fn interpolated(width: u32, height: u32, trials: u32, seed: u32) -> RenderParams {
+    RenderParams { interpolate: true, ..fixed(width, height, trials, seed) }
+}
+
 /// Everything before the first pixel, seen from the first camera.
 pub fn prepare(scene: &Arc<Scene>, settings: Settings) -> (Prepared, Stats) {
     let mut stats = Stats::new();

@@ -87,6 +87,13 @@ impl Record {
         // Columns: change of one band along the frame's axes
         let (mut rotation, mut translation) = (Mat3::ZERO, Mat3::ZERO);
         let outer = |axis: Vec3, value: Vec3| Mat3::from_cols(axis * value.x, axis * value.y, axis * value.z);
+        // Mean over each ring of the tangent of the angle with the normal: at the horizon its value in the middle is far off.
+        let tangents: Vec<f32> = (0..rings)
+            .map(|ring| {
+                let primitive = |s: f32| s.asin() - s * (1.0 - s * s).max(0.0).sqrt();
+                (primitive(boundary(ring + 1)) - primitive(boundary(ring))) * rings as f32
+            })
+            .collect();
         for sector in 0..sectors {
             let angle = |s: f32| TAU * s / sectors as f32;
             let (sin, cos) = angle(sector as f32 + 0.5).sin_cos();
@@ -98,7 +105,7 @@ impl Record {
                 let here = radiance[at(ring, sector)];
                 let sin2 = (ring as f32 + 0.5) / rings as f32;
                 let (sin, cos) = (sin2.sqrt(), (1.0 - sin2).sqrt());
-                rotation -= outer(around, here * (sin / cos));
+                rotation += outer(around, here * tangents[ring]);
                 if ring > 0 {
                     let s = boundary(ring);
                     let d = closest(at(ring, sector), at(ring - 1, sector));
