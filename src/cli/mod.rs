@@ -3,6 +3,7 @@
 pub mod compare;
 pub mod info;
 pub mod options;
+pub mod outside;
 pub mod render;
 pub mod simplify;
 pub mod validate;

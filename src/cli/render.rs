@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use clap::{Args, ValueEnum};
 
 use super::options::{MethodOptions, SceneOptions, Talk, load, set_threads};
+use super::outside::OutsideOptions;
 use crate::error::{Error, Result};
 use crate::image::{self, Metadata, ViewTransform, WriteOptions};
 use crate::pipeline::{Method, Prepared, Stats, choose_camera};
@@ -65,6 +66,8 @@ pub struct Options {
     #[arg(long, value_name = "N", default_value_t = BIAS_SAMPLES, help_heading = "Quality")]
     measure_bias: u32,
     #[command(flatten)]
+    outside: OutsideOptions,
+    #[command(flatten)]
     method: MethodOptions,
     /// Layers to write beside R,G,B where the format has named channels: hires, lores, hires_dev, lores_dev, albedo, normal,
     /// depth, trials, class, cluster, lookup_distance, near_share [default: all]
@@ -97,7 +100,8 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     stop_on_ctrl_c(&progress);
 
     let mut stats = Stats::new();
-    let scene = load(&options.scene, &mut stats)?;
+    let mut scene = load(&options.scene, &mut stats)?;
+    options.outside.surround(&mut scene)?;
     let camera = choose_camera(&scene, options.scene.camera.as_deref())?.clone();
     let params = options.render_params(&camera)?;
     let prepared = Prepared::new(scene, &camera, options.method.settings(), &progress, &mut stats)?;
@@ -111,7 +115,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         return Ok(ExitCode::FAILURE);
     }
     options.measure_bias(&prepared, &camera, &params, &rendering, &mut stats);
-    options.record_parameters(&params, rendering.stopped, &mut stats);
+    options.record_parameters(&params, rendering.stopped, &mut stats)?;
 
     let written = Instant::now();
     let developed = develop(&rendering.film, options.layers());
@@ -217,7 +221,7 @@ impl Options {
         stats.seconds.bias = start.elapsed().as_secs_f64();
     }
 
-    fn record_parameters(&self, params: &RenderParams, stopped: bool, stats: &mut Stats) {
+    fn record_parameters(&self, params: &RenderParams, stopped: bool, stats: &mut Stats) -> Result<()> {
         let map = &mut stats.parameters;
         for (key, value) in [
             ("scene", serde_json::json!(self.scene.scene.display().to_string())),
@@ -233,6 +237,7 @@ impl Options {
         ] {
             map.insert(key.to_owned(), value);
         }
+        self.outside.record(map)
     }
 
     fn summarise(&self, stats: &Stats, stopped: bool) {

@@ -40,7 +40,7 @@ pub fn show_radiosity(world: &World<'_>, far: &FarField<'_>, camera: &Camera, pa
 
 fn radiance(world: &World<'_>, far: &FarField<'_>, ray: &Ray, hit: &Hit) -> Vec3 {
     if !hit.is_hit() {
-        return Vec3::ZERO;
+        return world.lights.outside(ray.direction);
     }
     let reflected = far.reflected(hit, ray.direction);
     match far.geometry.sources[hit.triangle as usize] {
