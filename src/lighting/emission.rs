@@ -88,14 +88,15 @@ impl FluxTable {
         self.centre + basis(direction) * disk.extend(-1.1 * self.radius)
     }
 
-    /// A light and its probability.
-    fn choose(&self, u: f64) -> Option<(usize, f64)> {
+    /// A light, its probability, and where within its share `u` lies, 0..1.
+    fn choose(&self, u: f64) -> Option<(usize, f64, f64)> {
         let sum = *self.cumulative.last()?;
         let target = u * sum;
         let i = self.cumulative.partition_point(|&c| c <= target).min(self.cumulative.len() - 1);
         let before = if i == 0 { 0.0 } else { self.cumulative[i - 1] };
         let probability = (self.cumulative[i] - before) / sum;
-        (probability > 0.0).then_some((i, probability))
+        let rest = ((target - before) / (self.cumulative[i] - before)).clamp(0.0, 1.0 - f64::EPSILON);
+        (probability > 0.0).then_some((i, probability, rest))
     }
 }
 
@@ -123,7 +124,7 @@ impl Lights {
     /// A ray that leaves a light source, with a density proportional to the flux. `u[0]` chooses the light,
     /// `u[1..3]` the point, `u[3..5]` the direction. `None` where the chosen point of a textured light is black.
     pub fn sample_emission(&self, scene: &Scene, u: [f32; 5]) -> Option<EmittedRay> {
-        let (chosen, probability) = self.emission.choose(super::refined(u[0], [u[1], u[2]]))?;
+        let (chosen, probability, choice) = self.emission.choose(super::refined(u[0], [u[1], u[2]]))?;
         if let Some(light) = self.areas.lights.get(chosen) {
             let point = light.uniform_point([u[1], u[2]]);
             // Both faces: half of the first number's range each
@@ -141,7 +142,7 @@ impl Lights {
             return (flux.max_element() > 0.0).then_some(emitted);
         }
         let Some(light) = self.punctual().nth(chosen - self.areas.lights.len()) else {
-            let sample = self.environment.as_ref()?.sample_any([u[3], u[4]]);
+            let sample = self.environment.as_ref()?.sample_any(choice, [u[3], u[4]])?;
             let extent = self.emission.disk() / (sample.pdf * probability);
             let flux = (sample.radiance.as_dvec3() * extent).as_vec3();
             let ray = Ray::new(self.emission.on_disk(-sample.direction, [u[1], u[2]]), -sample.direction);

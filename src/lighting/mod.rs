@@ -7,6 +7,7 @@ mod area;
 mod bounds;
 mod emission;
 mod environment;
+mod openings;
 mod punctual;
 pub mod shadow;
 mod spherical;
@@ -17,7 +18,7 @@ mod tests;
 
 use glam::Vec3;
 
-use crate::backend::Hit;
+use crate::backend::{Hit, RayScene};
 use crate::sampling::{hash_all, unit};
 use crate::scene::{Aabb, LightKind, PunctualLight, Scene};
 use area::{AreaLight, AreaLights};
@@ -85,6 +86,14 @@ impl Lights {
         lights
     }
 
+    /// Finds out what of the environment is seen from where, so that samples go to the openings. `rays` is built from `scene`.
+    /// Changes variances, not means.
+    pub fn look_out(&mut self, scene: &Scene, rays: &dyn RayScene, seed: u32) {
+        if let Some(light) = &mut self.environment {
+            light.look_out(scene, rays, seed);
+        }
+    }
+
     /// Whether there is none.
     pub fn is_empty(&self) -> bool {
         self.tree.is_empty() && self.directional.is_empty() && self.environment.is_none()
@@ -105,7 +114,7 @@ impl Lights {
         let within = |below: f64, share: f64| ((choice - below) / share).clamp(0.0, 1.0 - f64::EPSILON);
         if choice >= kinds.finite + kinds.directional {
             let choice = within(kinds.finite + kinds.directional, kinds.environment);
-            return self.sample_environment(normal, choice, [u[1], u[2]], kinds.environment);
+            return self.sample_environment(position, normal, choice, [u[1], u[2]], kinds.environment);
         }
         if choice >= kinds.finite {
             return self.sample_directional(normal, within(kinds.finite, kinds.directional), kinds.directional);
@@ -178,7 +187,7 @@ impl Lights {
     pub fn pdf_outside(&self, position: Vec3, normal: Vec3, direction: Vec3) -> f32 {
         match (&self.environment, self.kinds(position, normal)) {
             (Some(light), Some(kinds)) if above(normal, direction) => {
-                (kinds.environment * light.pdf(normal, direction)) as f32
+                (kinds.environment * light.pdf(position, normal, direction)) as f32
             }
             _ => 0.0,
         }
@@ -198,8 +207,15 @@ impl Lights {
         (sum > 0.0).then(kinds)
     }
 
-    fn sample_environment(&self, normal: Vec3, choice: f64, u: [f32; 2], probability: f64) -> Option<LightSample> {
-        let sample = self.environment.as_ref()?.sample(normal, choice, u);
+    fn sample_environment(
+        &self,
+        position: Vec3,
+        normal: Vec3,
+        choice: f64,
+        u: [f32; 2],
+        probability: f64,
+    ) -> Option<LightSample> {
+        let sample = self.environment.as_ref()?.sample(position, normal, choice, u)?;
         let pdf = sample.pdf * probability;
         let weight = (sample.radiance.as_dvec3() / pdf).as_vec3();
         let usable = above(normal, sample.direction) && weight.is_finite() && weight.max_element() > 0.0;

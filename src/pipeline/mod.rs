@@ -69,7 +69,8 @@ impl Prepared {
         let backend = settings.backend.create(settings.threads)?;
         let start = Instant::now();
         let detailed = build_detailed(&scene, backend.as_ref())?;
-        let lights = Lights::new(&scene);
+        let mut lights = Lights::new(&scene);
+        lights.look_out(&scene, detailed.as_ref(), settings.seed);
         stats.seconds.build += start.elapsed().as_secs_f64();
         stats.backend = backend.name();
         stats.counts.triangles = scene.mesh.triangles.len() as u64;
