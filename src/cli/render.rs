@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::str::FromStr;
 use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
@@ -12,7 +13,7 @@ use crate::error::{Error, Result};
 use crate::image::{self, Metadata, ViewTransform, WriteOptions};
 use crate::pipeline::{Method, Prepared, Stats, choose_camera};
 use crate::render::layers::{Layer, develop};
-use crate::render::{self, PassTimes, RayCounts, RenderParams, Rendering, bias};
+use crate::render::{self, PassTimes, RayCounts, Region, RenderParams, Rendering, bias};
 use crate::scene::Camera;
 
 /// Pairs of paths that measure the bias when not said otherwise.
@@ -25,6 +26,25 @@ enum View {
     Filmic,
     /// Plain sRGB, clipped.
     Srgb,
+}
+
+/// One of several parts: `2/4`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct PartOf {
+    /// From 1.
+    number: u32,
+    parts: u32,
+}
+
+impl FromStr for PartOf {
+    type Err = String;
+
+    fn from_str(s: &str) -> std::result::Result<Self, String> {
+        let part =
+            s.split_once('/').and_then(|(i, n)| Some(PartOf { number: i.parse().ok()?, parts: n.parse().ok()? }));
+        part.filter(|p| (1..=p.parts).contains(&p.number) && p.parts <= 1 << 16)
+            .ok_or_else(|| "expected the number of a part and how many there are, as in 2/4".to_owned())
+    }
 }
 
 /// Options of `gsii render`.
@@ -41,6 +61,12 @@ pub struct Options {
     /// Height in pixels [default: from the width and the camera]
     #[arg(long, value_name = "N")]
     height: Option<u32>,
+    /// Render only pixels X0 to X1 - 1 across and Y0 to Y1 - 1 down, counted from the top left, as they are in the whole image
+    #[arg(long, value_names = ["X0", "Y0", "X1", "Y1"], num_args = 4, conflicts_with = "tile")]
+    crop: Option<Vec<u32>>,
+    /// Render only part I (from 1) of N that the image is cut into; 'gsii merge' joins them
+    #[arg(long, value_name = "I/N")]
+    tile: Option<PartOf>,
     /// Relative error of a pixel to aim for, in both passes
     #[arg(long, value_name = "X", help_heading = "Quality")]
     error: Option<f32>,
@@ -174,6 +200,7 @@ impl Options {
         Ok(RenderParams {
             width,
             height,
+            region: self.region([width, height])?,
             min_trials,
             max_trials,
             hires_error,
@@ -181,6 +208,26 @@ impl Options {
             time_limit: self.time_limit.map(Duration::from_secs_f64),
             features: self.layers().iter().any(|l| l.is_feature()),
             seed: self.method.seed,
+        })
+    }
+
+    /// The part of an image of `size` to render, where not all of it.
+    fn region(&self, size: [u32; 2]) -> Result<Option<Region>> {
+        if let Some(&[x0, y0, x1, y1]) = self.crop.as_deref() {
+            if x0 >= x1 || y0 >= y1 || x1 > size[0] || y1 > size[1] {
+                return Err(Error::Usage(format!(
+                    "--crop {x0} {y0} {x1} {y1} is no part of an image of {} x {} pixels: X0 < X1 <= {0} and Y0 < Y1 <= {1} are needed",
+                    size[0], size[1]
+                )));
+            }
+            return Ok(Some(Region { low: [x0, y0], high: [x1, y1] }));
+        }
+        let Some(PartOf { number, parts }) = self.tile else { return Ok(None) };
+        Region::part(number - 1, parts, size).map(Some).ok_or_else(|| {
+            Error::Usage(format!(
+                "--tile {number}/{parts}: an image of {} x {} pixels has not so many parts",
+                size[0], size[1]
+            ))
         })
     }
 

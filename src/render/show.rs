@@ -14,7 +14,7 @@ use crate::simplify::TriangleSource;
 
 /// Renders radiosity plus emission of the first surface of `far`, `min_trials` rays a pixel; everything goes to HIRES.
 pub fn show_radiosity(world: &World<'_>, far: &FarField<'_>, camera: &Camera, params: &RenderParams) -> Film {
-    let mut film = Film::new(params.width, params.height);
+    let mut film = params.film();
     let size = Vec2::new(params.width as f32, params.height as f32);
     film.tiles.par_iter_mut().for_each(|tile| {
         let n = params.min_trials.max(1);
