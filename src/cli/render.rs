@@ -262,8 +262,7 @@ impl Options {
             return;
         }
         let start = Instant::now();
-        let aspect = params.width as f32 / params.height as f32;
-        let bias = bias::measure(&prepared.world(), camera, aspect, self.measure_bias, params.seed);
+        let bias = bias::measure(&prepared.world(), camera, params, self.measure_bias);
         stats.record_bias(&bias, &rendering.film);
         stats.seconds.bias = start.elapsed().as_secs_f64();
     }

@@ -199,6 +199,11 @@ impl Tile {
         let size = [0, 1].map(|axis| TILE.min(size[axis] - origin[axis]));
         Tile { origin, size, pixels: vec![Pixel::default(); (size[0] * size[1]) as usize], dropped: 0 }
     }
+
+    /// Column and row of its pixel number `i`.
+    pub fn pixel(&self, i: u32) -> [u32; 2] {
+        [self.origin[0] + i % self.size[0], self.origin[1] + i / self.size[0]]
+    }
 }
 
 /// An image in the making, or a part of one.
