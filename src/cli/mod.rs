@@ -2,7 +2,9 @@
 
 pub mod compare;
 pub mod info;
+pub mod merge;
 pub mod options;
+pub mod output;
 pub mod outside;
 pub mod render;
 pub mod simplify;
@@ -31,6 +33,8 @@ struct Arguments {
 enum Command {
     /// Render an image of a glTF scene
     Render(render::Options),
+    /// Join the parts of an image that were rendered with --tile or --crop
+    Merge(merge::Options),
     /// Show what is in a scene and what would be done with it
     Info(info::Options),
     /// Write the simplified scene and say how well it stands for the detailed one
@@ -54,6 +58,7 @@ pub fn run() -> ExitCode {
     };
     let outcome = match &arguments.command {
         Command::Render(options) => render::run(options),
+        Command::Merge(options) => merge::run(options),
         Command::Info(options) => info::run(options),
         Command::Simplify(options) => simplify::run(options),
         Command::Validate(options) => validate::run(options),

@@ -5,12 +5,13 @@ use std::process::ExitCode;
 use std::str::FromStr;
 use std::time::{Duration, Instant};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 
 use super::options::{MethodOptions, SceneOptions, Talk, load, set_threads};
+use super::output::OutputOptions;
 use super::outside::OutsideOptions;
 use crate::error::{Error, Result};
-use crate::image::{self, Metadata, ViewTransform, WriteOptions};
+use crate::image::Metadata;
 use crate::pipeline::{Method, Prepared, Stats, choose_camera};
 use crate::render::layers::{Layer, develop};
 use crate::render::{self, PassTimes, RayCounts, Region, RenderParams, Rendering, bias};
@@ -18,15 +19,6 @@ use crate::scene::Camera;
 
 /// Pairs of paths that measure the bias when not said otherwise.
 const BIAS_SAMPLES: u32 = 1 << 15;
-
-/// Tone curves by their names on the command line.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum View {
-    /// AgX: bright light bleaches instead of clipping.
-    Filmic,
-    /// Plain sRGB, clipped.
-    Srgb,
-}
 
 /// One of several parts: `2/4`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,9 +44,8 @@ impl FromStr for PartOf {
 pub struct Options {
     #[command(flatten)]
     scene: SceneOptions,
-    /// Image to write, in any format OpenImageIO writes, by extension; may be repeated
-    #[arg(short, long, value_name = "IMAGE", required = true)]
-    output: Vec<PathBuf>,
+    #[command(flatten)]
+    output: OutputOptions,
     /// Width in pixels [default: 1280, or from the height and the camera]
     #[arg(long, value_name = "N")]
     width: Option<u32>,
@@ -99,12 +90,6 @@ pub struct Options {
     /// depth, trials, class, cluster, lookup_distance, near_share [default: all]
     #[arg(long, value_name = "NAME,...", value_delimiter = ',', help_heading = "Output")]
     layers: Option<Vec<Layer>>,
-    /// Stops by which formats for screens are brightened [default: automatic]
-    #[arg(long, value_name = "STOPS", allow_hyphen_values = true, help_heading = "Output")]
-    exposure: Option<f32>,
-    /// Tone curve of formats for screens
-    #[arg(long, value_enum, default_value_t = View::Filmic, help_heading = "Output")]
-    view: View,
     /// Write times, counts, errors and parameters as JSON
     #[arg(long, value_name = "FILE.json", help_heading = "Output")]
     stats: Option<PathBuf>,
@@ -118,9 +103,7 @@ pub struct Options {
 /// Bad options, bad input, a failing library, an image that cannot be written.
 pub fn run(options: &Options) -> Result<ExitCode> {
     let start = Instant::now();
-    for path in &options.output {
-        image::check_writable(path)?;
-    }
+    options.output.check()?;
     set_threads(options.method.threads)?;
     let progress = options.talk.progress();
     stop_on_ctrl_c(&progress);
@@ -146,18 +129,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     let written = Instant::now();
     let developed = develop(&rendering.film, options.layers());
     let metadata = metadata(&stats, &camera);
-    let write_options = WriteOptions {
-        exposure_stops: options.exposure.unwrap_or_else(|| image::auto_exposure(&developed)),
-        view: match options.view {
-            View::Filmic => ViewTransform::Filmic,
-            View::Srgb => ViewTransform::Srgb,
-        },
-        dither: true,
-        ..WriteOptions::default()
-    };
-    for path in &options.output {
-        image::write(path, &developed, &metadata, &write_options)?;
-    }
+    options.output.write(&developed, &metadata)?;
     stats.seconds.write = written.elapsed().as_secs_f64();
     stats.seconds.total = start.elapsed().as_secs_f64();
     stats.peak_rss_bytes = peak_rss_bytes();
@@ -283,16 +255,18 @@ impl Options {
         ] {
             map.insert(key.to_owned(), value);
         }
+        if let Some(Region { low: [x0, y0], high: [x1, y1] }) = params.region {
+            map.insert("region".to_owned(), format!("{x0} {y0} {x1} {y1}").into());
+        }
         self.outside.record(map)
     }
 
     fn summarise(&self, stats: &Stats, stopped: bool) {
-        let outputs: Vec<String> = self.output.iter().map(|p| p.display().to_string()).collect();
         let s = &stats.seconds;
         let e = &stats.error;
         self.talk.say(format!(
             "{}{}: {:.1} s (load {:.1}, simplify {:.1}, build {:.1}, radiosity {:.1}, HIRES {:.1}, LORES {:.1})",
-            outputs.join(", "),
+            self.output.names(),
             if stopped { " (stopped early, with the trials there were)" } else { "" },
             s.total,
             s.load,

@@ -10,12 +10,16 @@ use solar_positioning::{Location, RefractionCorrection, SolarPositions, delta_t}
 
 use super::environment::{Environment, SunDisk};
 use crate::error::{Error, Result};
+use crate::image::view::EFFICACY;
 
 /// Columns and rows of the map: texels of 0.18 degrees.
 const SIZE: [usize; 2] = [2048, 1024];
 
 /// Sine of the sun's mean angular radius, 0.2666 degrees.
 const SUN_SIN_RADIUS: f32 = 0.004_653;
+
+/// From radiance weighted by the eye's sensitivity, of which 1 W/(sr m^2) is 683 cd/m^2 by definition, to ours.
+const PER_WEIGHTED: f32 = (683.0 / EFFICACY) as f32;
 
 /// Effective temperature of the sun, kelvin.
 const SUN_TEMPERATURE: f64 = 5772.0;
@@ -67,8 +71,8 @@ impl Sky {
     }
 
     /// The sky by Hosek and Wilkie, "An analytic model for full spectral sky-dome radiance" (2012), with a disk for the sun and
-    /// an endless diffuse ground that both light. Radiance is W/(sr m^2) weighted by the eye's sensitivity: 683 times its
-    /// luminance is cd/m^2.
+    /// an endless diffuse ground that both light. Radiance is W/(sr m^2) of visible light: [`EFFICACY`] times its luminance is
+    /// cd/m^2.
     ///
     /// # Errors
     /// [`Error::Usage`] for values out of range.
@@ -101,7 +105,7 @@ impl Sky {
                 let direction = frame.direction(((i % w) as f32 + 0.5) / w as f32, theta.cos());
                 let gamma = direction.cross(sun.direction).length().atan2(direction.dot(sun.direction));
                 let band = |channel| model.radiance(theta, gamma, channel);
-                Vec3::new(band(Channel::R), band(Channel::G), band(Channel::B)).max(Vec3::ZERO)
+                PER_WEIGHTED * Vec3::new(band(Channel::R), band(Channel::G), band(Channel::B)).max(Vec3::ZERO)
             })
             .collect();
         let above = |(row, texels): (usize, &[Vec3])| {
@@ -138,7 +142,7 @@ fn sun_radiance(elevation: f32, turbidity: f32) -> Vec3 {
         Vec3::new(-1.537_383, 1.875_968, -0.203_977),
         Vec3::new(-0.498_611, 0.041_555, 1.056_972),
     );
-    (to_rgb * xyz.as_vec3()).max(Vec3::ZERO)
+    PER_WEIGHTED * (to_rgb * xyz.as_vec3()).max(Vec3::ZERO)
 }
 
 /// Spectral radiance of a black body of the sun's temperature, W/(sr m^3), at a wavelength in metres (Planck).
@@ -184,7 +188,7 @@ mod tests {
             }
         }
         of_sky *= std::f64::consts::PI / f64::from(rows * columns);
-        [0.683 * of_sky, 0.683 * luminance(sun.radiance.to_array()) * sun.solid_angle()]
+        [1e-3 * EFFICACY * of_sky, 1e-3 * EFFICACY * luminance(sun.radiance.to_array()) * sun.solid_angle()]
     }
 
     /// The clear sky of the IES (Calculation Procedures Committee, "Recommended practice for the calculation of daylight availability",
@@ -217,7 +221,7 @@ mod tests {
         assert!(evening.x < 0.2 * sun_radiance(FRAC_PI_2, 3.0).x);
         let sky = Sky { ground: 0.5, ..Sky::default() };
         let below = luminance(sky.environment().unwrap().radiance(Vec3::NEG_Y).to_array());
-        let [of_sky, of_sun] = illuminances(&sky).map(|klx| klx / 0.683);
+        let [of_sky, of_sun] = illuminances(&sky).map(|klx| klx / (1e-3 * EFFICACY));
         let exact = 0.5 / std::f64::consts::PI * (of_sky + of_sun * f64::from(sky.elevation.sin()));
         // Two quadratures of one function with 0.2 degree steps.
         assert!((below / exact - 1.0).abs() < 0.01, "{below} {exact}");
