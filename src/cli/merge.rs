@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::Args;
 
 use super::options::Talk;
-use super::output::OutputOptions;
+use super::output::{OutputOptions, names};
 use crate::error::Result;
 use crate::image;
 
@@ -27,9 +27,9 @@ pub struct Options {
 /// # Errors
 /// Parts that are missing, overlap or do not belong together; images that cannot be written.
 pub fn run(options: &Options) -> Result<ExitCode> {
-    options.output.check()?;
+    OutputOptions::check(&options.output.output)?;
     let (whole, metadata) = image::merge(&options.parts)?;
-    options.output.write(&whole, &metadata)?;
-    options.talk.say(format!("{}: {} parts", options.output.names(), options.parts.len()));
+    options.output.write(&options.output.output, &whole, &metadata)?;
+    options.talk.say(format!("{}: {} parts", names(&options.output.output), options.parts.len()));
     Ok(ExitCode::SUCCESS)
 }

@@ -2,6 +2,7 @@
 
 pub mod compare;
 pub mod info;
+pub mod manual;
 pub mod merge;
 pub mod options;
 pub mod output;
@@ -12,7 +13,7 @@ pub mod validate;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 
 use crate::error::Error;
 
@@ -43,6 +44,10 @@ enum Command {
     Validate(validate::Options),
     /// Error metrics of an image against a reference
     Compare(compare::Options),
+    /// Print a manual page (troff: read it with 'gsii man render | man -l -')
+    Man(manual::ManOptions),
+    /// Print a script that completes commands and options in a shell
+    Completions(manual::CompletionOptions),
 }
 
 /// Runs the command line and returns its exit code.
@@ -63,6 +68,8 @@ pub fn run() -> ExitCode {
         Command::Simplify(options) => simplify::run(options),
         Command::Validate(options) => validate::run(options),
         Command::Compare(options) => compare::run(options),
+        Command::Man(options) => manual::man(options, Arguments::command()),
+        Command::Completions(options) => manual::completions(options, Arguments::command()),
     };
     match outcome {
         Ok(code) => code,

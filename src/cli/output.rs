@@ -42,19 +42,19 @@ pub struct OutputOptions {
 }
 
 impl OutputOptions {
-    /// Finds out before the work whether all images can be written.
+    /// Finds out before the work whether images can be written.
     ///
     /// # Errors
     /// When one of them cannot.
-    pub fn check(&self) -> Result<()> {
-        self.output.iter().try_for_each(|path| image::check_writable(path))
+    pub fn check(paths: &[PathBuf]) -> Result<()> {
+        paths.iter().try_for_each(|path| image::check_writable(path))
     }
 
-    /// Writes an image to every file.
+    /// Writes an image to each of `paths`.
     ///
     /// # Errors
     /// When one of them cannot be written; those before it are.
-    pub fn write(&self, image: &Image, metadata: &Metadata) -> Result<()> {
+    pub fn write(&self, paths: &[PathBuf], image: &Image, metadata: &Metadata) -> Result<()> {
         let view = match self.view {
             View::Filmic => ViewTransform::Filmic,
             View::Srgb => ViewTransform::Srgb,
@@ -72,11 +72,11 @@ impl OutputOptions {
             compression: self.compression,
             tiled: self.tiled,
         };
-        self.output.iter().try_for_each(|path| image::write(path, image, metadata, &options))
+        paths.iter().try_for_each(|path| image::write(path, image, metadata, &options))
     }
+}
 
-    /// The files by name, for messages.
-    pub fn names(&self) -> String {
-        self.output.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ")
-    }
+/// Files by name, for messages.
+pub fn names(paths: &[PathBuf]) -> String {
+    paths.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ")
 }

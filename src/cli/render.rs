@@ -8,17 +8,21 @@ use std::time::{Duration, Instant};
 use clap::Args;
 
 use super::options::{MethodOptions, SceneOptions, Talk, load, set_threads};
-use super::output::OutputOptions;
+use super::output::{OutputOptions, names};
 use super::outside::OutsideOptions;
 use crate::error::{Error, Result};
 use crate::image::Metadata;
 use crate::pipeline::{Method, Prepared, Stats, choose_camera};
+use crate::progress::Progress;
 use crate::render::layers::{Layer, develop};
 use crate::render::{self, PassTimes, RayCounts, Region, RenderParams, Rendering, bias};
-use crate::scene::Camera;
+use crate::scene::{Camera, Scene};
 
 /// Pairs of paths that measure the bias when not said otherwise.
 const BIAS_SAMPLES: u32 = 1 << 15;
+
+/// In place of a camera's name: all of them.
+const ALL_CAMERAS: &str = "all";
 
 /// One of several parts: `2/4`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -103,7 +107,7 @@ pub struct Options {
 /// Bad options, bad input, a failing library, an image that cannot be written.
 pub fn run(options: &Options) -> Result<ExitCode> {
     let start = Instant::now();
-    options.output.check()?;
+    OutputOptions::check(&options.output.output)?;
     set_threads(options.method.threads)?;
     let progress = options.talk.progress();
     stop_on_ctrl_c(&progress);
@@ -111,38 +115,98 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     let mut stats = Stats::new();
     let mut scene = load(&options.scene, &mut stats)?;
     options.outside.surround(&mut scene)?;
-    let camera = choose_camera(&scene, options.scene.camera.as_deref())?.clone();
-    let params = options.render_params(&camera)?;
-    let prepared = Prepared::new(scene, &camera, options.method.settings(), &progress, &mut stats)?;
+    let views = options.views(&scene)?;
+    let params = views.iter().map(|view| options.render_params(&view.camera)).collect::<Result<Vec<_>>>()?;
+    let cameras: Vec<Camera> = views.iter().map(|view| view.camera.clone()).collect();
+    let prepared = Prepared::for_cameras(scene, &cameras, options.method.settings(), &progress, &mut stats)?;
     for warning in &stats.warnings {
         log::warn!("{warning}");
     }
-    let rendering = options.render(&prepared, &camera, &params, &progress);
-    stats.record_rendering(&rendering);
-    if rendering.film.pixels().all(|p| p.hires.trials() == 0) {
-        options.talk.say("gsii: stopped before the first trial; nothing was written");
-        return Ok(ExitCode::FAILURE);
+    for (view, params) in views.iter().zip(&params) {
+        // Times and counts of the preparation belong to every view.
+        let mut stats = stats.clone();
+        if !options.render_view(&prepared, view, params, start, &progress, &mut stats)? {
+            options.talk.say("gsii: stopped before the first trial; nothing was written");
+            return Ok(ExitCode::FAILURE);
+        }
+        if progress.stopped() {
+            break;
+        }
     }
-    options.measure_bias(&prepared, &camera, &params, &rendering, &mut stats);
-    options.record_parameters(&params, rendering.stopped, &mut stats)?;
-
-    let written = Instant::now();
-    let developed = develop(&rendering.film, options.layers());
-    let metadata = metadata(&stats, &camera);
-    options.output.write(&developed, &metadata)?;
-    stats.seconds.write = written.elapsed().as_secs_f64();
-    stats.seconds.total = start.elapsed().as_secs_f64();
-    stats.peak_rss_bytes = peak_rss_bytes();
-    if let Some(path) = &options.stats {
-        write_stats(path, &stats)?;
-    }
-    options.summarise(&stats, rendering.stopped);
     Ok(ExitCode::SUCCESS)
+}
+
+/// A camera and where its image goes.
+struct View {
+    camera: Camera,
+    outputs: Vec<PathBuf>,
+    stats: Option<PathBuf>,
+}
+
+/// The path with a camera's name before its extension.
+fn of_camera(path: &Path, name: &str) -> PathBuf {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let extension = path.extension().map(|e| format!(".{}", e.to_string_lossy())).unwrap_or_default();
+    path.with_file_name(format!("{stem}-{name}{extension}"))
 }
 
 impl Options {
     fn layers(&self) -> &[Layer] {
         self.layers.as_deref().unwrap_or(&Layer::ALL)
+    }
+
+    /// The cameras that are asked for. With several, their names are in those of the files.
+    fn views(&self, scene: &Scene) -> Result<Vec<View>> {
+        if self.scene.camera.as_deref() != Some(ALL_CAMERAS) {
+            let camera = choose_camera(scene, self.scene.camera.as_deref())?.clone();
+            return Ok(vec![View { camera, outputs: self.output.output.clone(), stats: self.stats.clone() }]);
+        }
+        let harmless = |c: char| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' };
+        let mut names: Vec<String> = Vec::new();
+        let mut views = Vec::new();
+        for (number, camera) in scene.cameras.iter().enumerate() {
+            let mut name: String = camera.name.chars().map(harmless).collect();
+            if name.is_empty() || names.contains(&name) {
+                name = format!("{name}{number}");
+            }
+            let outputs: Vec<PathBuf> = self.output.output.iter().map(|path| of_camera(path, &name)).collect();
+            OutputOptions::check(&outputs)?;
+            let stats = self.stats.as_ref().map(|path| of_camera(path, &name));
+            views.push(View { camera: camera.clone(), outputs, stats });
+            names.push(name);
+        }
+        Ok(views)
+    }
+
+    /// Renders and writes one view. False when it was stopped before the first trial.
+    fn render_view(
+        &self,
+        prepared: &Prepared,
+        view: &View,
+        params: &RenderParams,
+        start: Instant,
+        progress: &Progress,
+        stats: &mut Stats,
+    ) -> Result<bool> {
+        let camera = &view.camera;
+        let rendering = self.render(prepared, camera, params, progress);
+        stats.record_rendering(&rendering);
+        if rendering.film.pixels().all(|p| p.hires.trials() == 0) {
+            return Ok(false);
+        }
+        self.measure_bias(prepared, camera, params, &rendering, stats);
+        self.record_parameters(camera, params, rendering.stopped, stats)?;
+        let written = Instant::now();
+        let developed = develop(&rendering.film, self.layers());
+        self.output.write(&view.outputs, &developed, &metadata(stats))?;
+        stats.seconds.write = written.elapsed().as_secs_f64();
+        stats.seconds.total = start.elapsed().as_secs_f64();
+        stats.peak_rss_bytes = peak_rss_bytes();
+        if let Some(path) = &view.stats {
+            write_stats(path, stats)?;
+        }
+        self.summarise(&view.outputs, stats, rendering.stopped);
+        Ok(true)
     }
 
     fn render_params(&self, camera: &Camera) -> Result<RenderParams> {
@@ -203,13 +267,7 @@ impl Options {
         })
     }
 
-    fn render(
-        &self,
-        prepared: &Prepared,
-        camera: &Camera,
-        params: &RenderParams,
-        progress: &crate::progress::Progress,
-    ) -> Rendering {
+    fn render(&self, prepared: &Prepared, camera: &Camera, params: &RenderParams, progress: &Progress) -> Rendering {
         let world = prepared.world();
         if let (Method::Radiosity, Some(far)) = (prepared.settings.method, world.far) {
             let start = Instant::now();
@@ -239,11 +297,17 @@ impl Options {
         stats.seconds.bias = start.elapsed().as_secs_f64();
     }
 
-    fn record_parameters(&self, params: &RenderParams, stopped: bool, stats: &mut Stats) -> Result<()> {
+    fn record_parameters(
+        &self,
+        camera: &Camera,
+        params: &RenderParams,
+        stopped: bool,
+        stats: &mut Stats,
+    ) -> Result<()> {
         let map = &mut stats.parameters;
         for (key, value) in [
             ("scene", serde_json::json!(self.scene.scene.display().to_string())),
-            ("camera", serde_json::json!(self.scene.camera)),
+            ("camera", camera.name.as_str().into()),
             ("width", params.width.into()),
             ("height", params.height.into()),
             ("min_trials", params.min_trials.into()),
@@ -261,12 +325,12 @@ impl Options {
         self.outside.record(map)
     }
 
-    fn summarise(&self, stats: &Stats, stopped: bool) {
+    fn summarise(&self, outputs: &[PathBuf], stats: &Stats, stopped: bool) {
         let s = &stats.seconds;
         let e = &stats.error;
         self.talk.say(format!(
             "{}{}: {:.1} s (load {:.1}, simplify {:.1}, build {:.1}, radiosity {:.1}, HIRES {:.1}, LORES {:.1})",
-            self.output.names(),
+            names(outputs),
             if stopped { " (stopped early, with the trials there were)" } else { "" },
             s.total,
             s.load,
@@ -288,7 +352,7 @@ impl Options {
     }
 }
 
-fn stop_on_ctrl_c(progress: &crate::progress::Progress) {
+fn stop_on_ctrl_c(progress: &Progress) {
     let progress = progress.clone();
     // Fails only when a handler exists already (several runs in one process): the first one stays.
     let _ = ctrlc::set_handler(move || {
@@ -300,10 +364,9 @@ fn stop_on_ctrl_c(progress: &crate::progress::Progress) {
 }
 
 /// The run's parameters and errors for the file header.
-fn metadata(stats: &Stats, camera: &Camera) -> Metadata {
+fn metadata(stats: &Stats) -> Metadata {
     let mut metadata = Metadata::new();
     metadata.set("Software", format!("gsii {}", stats.version));
-    metadata.set("gsii:camera", camera.name.as_str());
     for (key, value) in &stats.parameters {
         let name = format!("gsii:{key}");
         match (value.as_i64(), value.as_f64(), value.as_str()) {
