@@ -52,12 +52,12 @@ fn spotted() -> Environment {
 fn white_bodies_vanish_in_uniform_surroundings() {
     let exact = 2.0;
     let scene = within(&clutter(1.0), Environment::uniform(Vec3::splat(exact as f32)));
-    let methods = [(Method::Mcpt, None), (Method::Pmm, None), (Method::Gsii, Some(0.3)), (Method::Gsii, Some(1.0))];
+    let methods = [(Method::Mcpt, None), (Method::Pmm, None), (Method::Gsii, Some(0.5))];
     for (method, r_thresh) in methods {
-        let settings = Settings { method, r_thresh, radiosity_error: 0.01, ..Settings::default() };
+        let settings = Settings { method, r_thresh, radiosity_error: 0.03, ..Settings::default() };
         let (prepared, stats) = prepare(&scene, settings);
         assert!(method != Method::Gsii || stats.counts.clusters > 0, "something is simplified");
-        let rendering = render(&prepared, &fixed(36, 24, 256, 5));
+        let rendering = render(&prepared, &fixed(36, 24, 64, 5));
         let got = Estimate::whole(&rendering.film);
         let error = got.error.hypot(stats.error.radiosity * rendering.film.mean(|p| p.lores.mean()));
         let z = (got.mean - exact) / error;
@@ -71,7 +71,7 @@ fn white_bodies_vanish_in_uniform_surroundings() {
 #[test]
 fn radiosity_of_white_bodies_is_that_of_the_surroundings() {
     let scene = within(&clutter(1.0), Environment::uniform(Vec3::ONE));
-    let settings = Settings { method: Method::Radiosity, radiosity_error: 0.01, ..Settings::default() };
+    let settings = Settings { method: Method::Radiosity, radiosity_error: 0.05, ..Settings::default() };
     let (prepared, stats) = prepare(&scene, settings);
     let world = prepared.world();
     let film = show_radiosity(&world, &world.far.unwrap(), &prepared.scene.cameras[0], &fixed(36, 24, 4, 0));
