@@ -14,6 +14,7 @@ pub mod material;
 pub mod mesh;
 mod overview;
 mod pane;
+pub mod plane;
 pub mod sky;
 #[cfg(test)]
 mod tests;
@@ -32,6 +33,7 @@ pub use gltf::{LoadOptions, load};
 pub use light::{LightKind, PunctualLight};
 pub use material::{Alpha, Material, TextureSlot};
 pub use mesh::{Mesh, Object};
+pub use plane::Plane;
 pub use texture::{Texels, Texture, Wrap};
 
 /// A complete scene in recentred world coordinates (metres unless the file says otherwise, y up).

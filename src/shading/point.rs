@@ -1,17 +1,12 @@
 //! Surface points with error bounds, and ray origins that stay on the right side.
 
-use glam::{DVec3, Mat3, Vec2, Vec3};
+use glam::{Mat3, Vec2, Vec3};
 
 use crate::backend::Hit;
-use crate::scene::{Material, Scene};
+use crate::scene::{Plane, Scene, TextureSlot};
 
-/// Unit roundoff of f32, 2^-24.
-const ROUNDOFF: f64 = f32::EPSILON as f64 * 0.5;
-
-/// Roundings that one product in the determinant of a ray-triangle test goes through: translation of the vertices
-/// (1), two edges from them (3 each, as their error is absolute), two products, a difference and a dot product (5),
-/// rounded up for terms of second order.
-const TEST_ROUNDINGS: f64 = 16.0;
+/// Unit roundoff of f32, 2^-24, with room for the rounding of the bound itself.
+const ROUNDOFF: f32 = f32::EPSILON * 0.500_001;
 
 /// Cosine of the largest angle between geometric and shading normal, 89 degrees.
 const MIN_NORMAL_COSINE: f32 = 0.017_452_406;
@@ -43,7 +38,9 @@ impl SurfacePoint {
     pub fn new(scene: &Scene, hit: &Hit) -> Self {
         let mesh = &scene.mesh;
         let indices = mesh.triangles[hit.triangle as usize].map(|i| i as usize);
-        let (position, error, geometric_normal) = locate(mesh.corners(hit.triangle), hit.u, hit.v);
+        let plane = &mesh.planes[hit.triangle as usize];
+        let (position, error) = locate(mesh.corners(hit.triangle), plane, hit.u, hit.v);
+        let geometric_normal = plane.normal;
         let weights = [1.0 - hit.u - hit.v, hit.u, hit.v];
 
         let uv = [&mesh.uvs[0], &mesh.uvs[1]].map(|set| {
@@ -63,33 +60,34 @@ impl SurfacePoint {
                 }
             }
         }
-        let mut point = SurfacePoint {
+        let material = &scene.materials[mesh.object(hit.triangle).material as usize];
+        if let Some(slot) = &material.normal_texture {
+            let bent = mapped_normal(scene, hit.triangle, &uv, slot, material.normal_scale, shading_normal);
+            // What is bent below the surface stays unbent
+            shading_normal = bent.filter(|n| n.dot(geometric_normal) > 0.0).unwrap_or(shading_normal);
+        }
+        SurfacePoint {
             position,
             error,
             geometric_normal,
-            shading_normal,
+            shading_normal: within_limit(shading_normal, geometric_normal),
             uv,
             triangle: hit.triangle,
             u: hit.u,
             v: hit.v,
-        };
-        let material = &scene.materials[mesh.object(hit.triangle).material as usize];
-        if material.normal_texture.is_some() {
-            point.shading_normal = point.mapped_normal(scene, material).unwrap_or(shading_normal);
         }
-        point.shading_normal = within_limit(point.shading_normal, geometric_normal);
-        point
     }
 
     /// The point at `u`, `v` of a triangle with the given corners, which need not belong to a scene: flat, without texture
     /// coordinates. `triangle` is only stored.
     pub fn flat(corners: [Vec3; 3], triangle: u32, u: f32, v: f32) -> Self {
-        let (position, error, normal) = locate(corners, u, v);
+        let plane = Plane::of(corners);
+        let (position, error) = locate(corners, &plane, u, v);
         SurfacePoint {
             position,
             error,
-            geometric_normal: normal,
-            shading_normal: normal,
+            geometric_normal: plane.normal,
+            shading_normal: plane.normal,
             uv: [Vec2::ZERO; 2],
             triangle,
             u,
@@ -115,55 +113,37 @@ impl SurfacePoint {
         let origin = self.position + offset;
         Vec3::new(away(origin.x, offset.x), away(origin.y, offset.y), away(origin.z, offset.z))
     }
-
-    /// The shading normal as the normal map bends it; `None` where texture coordinates span no area.
-    fn mapped_normal(&self, scene: &Scene, material: &Material) -> Option<Vec3> {
-        let slot = material.normal_texture.as_ref()?;
-        let set = usize::from(slot.uv_set);
-        let coordinates = scene.mesh.uvs.get(set).filter(|uvs| !uvs.is_empty())?;
-        let [a, b, c] = scene.mesh.triangles[self.triangle as usize].map(|i| coordinates[i as usize]);
-        let [duv1, duv2] = [b - a, c - a].map(|d| slot.transform.transform_vector2(d));
-        let [a, b, c] = scene.mesh.corners(self.triangle);
-        let frame = texture_frame(self.shading_normal, [b - a, c - a], [duv1, duv2])?;
-
-        let uv = slot.transform.transform_point2(self.uv[set]);
-        let map = 2.0 * scene.textures[slot.texture as usize].sample(uv).truncate() - Vec3::ONE;
-        let scale = material.normal_scale;
-        let bent = (frame * Vec3::new(map.x * scale, map.y * scale, map.z)).try_normalize()?;
-        (bent.dot(self.geometric_normal) > 0.0).then_some(bent)
-    }
 }
 
-/// Rays start at least this far from their triangle, as a share of its size.
-const SMALLEST_OFFSET: f64 = 1e-12;
+/// `normal` as the normal map bends it at texture coordinates `uv`; `None` where texture coordinates span no area.
+fn mapped_normal(
+    scene: &Scene,
+    triangle: u32,
+    uv: &[Vec2; 2],
+    slot: &TextureSlot,
+    scale: f32,
+    normal: Vec3,
+) -> Option<Vec3> {
+    let set = usize::from(slot.uv_set);
+    let coordinates = scene.mesh.uvs.get(set).filter(|uvs| !uvs.is_empty())?;
+    let [a, b, c] = scene.mesh.triangles[triangle as usize].map(|i| coordinates[i as usize]);
+    let [duv1, duv2] = [b - a, c - a].map(|d| slot.transform.transform_vector2(d));
+    let [a, b, c] = scene.mesh.corners(triangle);
+    let frame = texture_frame(normal, [b - a, c - a], [duv1, duv2])?;
 
-/// Position, error bound and unit normal at barycentric weights `u` and `v` of the second and third corner.
+    let uv = slot.transform.transform_point2(uv[set]);
+    let map = 2.0 * scene.textures[slot.texture as usize].sample(uv).truncate() - Vec3::ONE;
+    (frame * Vec3::new(map.x * scale, map.y * scale, map.z)).try_normalize()
+}
+
+/// Position and error bound at barycentric weights `u` and `v` of the second and third corner.
 ///
-/// Evaluated in f64, so that the position's own error is its rounding to f32. The larger part of the bound is the
-/// error of a later f32 intersection test from there: the signed distance to the plane is a determinant of vectors
-/// no longer than the triangle's extent `w` along each axis, divided by the length of the normal; its six products
-/// are each off by at most [`TEST_ROUNDINGS`] roundings. That holds for Moeller-Trumbore as for Embree's robust
-/// (Pluecker) test, and is nothing for walls along the axes.
-fn locate(corners: [Vec3; 3], u: f32, v: f32) -> (Vec3, Vec3, Vec3) {
+/// Evaluated in f64, so that the position's own error is its rounding to f32.
+fn locate(corners: [Vec3; 3], plane: &Plane, u: f32, v: f32) -> (Vec3, Vec3) {
     let [a, b, c] = corners.map(Vec3::as_dvec3);
-    let (e1, e2) = (b - a, c - a);
-    let cross = e1.cross(e2);
-    let double_area = cross.length();
-    let position = (a + f64::from(u) * e1 + f64::from(v) * e2).as_vec3();
-    let rounding = ROUNDOFF * position.as_dvec3().abs() + 8.0 * f64::EPSILON * (a.abs() + b.abs() + c.abs());
-    if double_area == 0.0 {
-        return (position, rounding.as_vec3(), Vec3::ZERO);
-    }
-    let inverse = 1.0 / double_area;
-    let normal = cross * inverse;
-    let extent = a.max(b).max(c) - a.min(b).min(c) + rounding;
-    let test_error = |w: DVec3| 6.0 * TEST_ROUNDINGS * ROUNDOFF * w.x * w.y * w.z * inverse;
-    // The origin moves off the triangle by the bound itself, which lengthens the vectors a little.
-    let moved = normal.abs().dot(rounding) + test_error(extent);
-    // In a plane through the origin along the axes all of this is zero, and rays started in the plane would hit it at 0.
-    let least = SMALLEST_OFFSET * extent.max_element();
-    let distance = test_error(extent + 2.0 * moved * normal.abs()).max(least);
-    (position, (rounding + distance * normal.abs()).as_vec3(), normal.as_vec3())
+    let position = (a + f64::from(u) * (b - a) + f64::from(v) * (c - a)).as_vec3();
+    let rounding = ROUNDOFF * position.abs() + plane.interpolation;
+    (position, rounding + plane.clearance * plane.normal.abs())
 }
 
 /// Axes of a normal map on a triangle with these edges in space and in texture coordinates: x along u, y up in the
@@ -193,6 +173,7 @@ fn within_limit(normal: Vec3, geometric: Vec3) -> Vec3 {
 mod tests {
     use super::*;
     use crate::sampling::{hash_all, uniform_sphere, unit};
+    use crate::scene::Material;
     use crate::shading::testing::scene_of;
 
     /// Moeller and Trumbore 1997, in f32, both faces; the ray parameter where `0 <= t`.
