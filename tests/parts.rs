@@ -27,7 +27,8 @@ fn crops_have_the_bits_of_the_whole() {
     let room = scene(&lit_room());
     for method in [Method::Gsii, Method::Mcpt] {
         let (prepared, _) = prepare(&room, Settings { method, ..Settings::default() });
-        let params = RenderParams { max_trials: 256, hires_error: 0.1, lores_error: 0.1, features: true, ..fixed(45, 30, 4, 3) };
+        let params =
+            RenderParams { max_trials: 256, hires_error: 0.1, lores_error: 0.1, features: true, ..fixed(45, 30, 4, 3) };
         let whole = render(&prepared, &params).film;
         let trials: Vec<u32> = whole.pixels().map(|p| p.lores.trials()).collect();
         assert!(trials.iter().min() < trials.iter().max(), "trials are shared out unevenly");

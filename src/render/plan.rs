@@ -157,6 +157,7 @@ mod tests {
             region: None,
             time_limit: None,
             features: false,
+            interpolate: false,
             seed: 0,
         }
     }
