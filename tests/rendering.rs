@@ -172,7 +172,7 @@ fn gsii_is_path_tracing_plus_the_measured_bias() {
     let (mcpt, _) = prepare(&office, with(Method::Mcpt));
     let a = Estimate::whole(&render(&gsii, &fixed(48, 32, 128, 21)).film);
     let b = Estimate::whole(&render(&mcpt, &fixed(48, 32, 128, 22)).film);
-    let measured = bias::measure(&gsii.world(), &office.cameras[0], 1.5, 1 << 16, 23);
+    let measured = bias::measure(&gsii.world(), &office.cameras[0], &fixed(48, 32, 1, 23), 1 << 16);
     let bias = measured.mean.iter().sum::<f64>() / 3.0;
     let bias_error = measured.standard_error.iter().sum::<f64>() / 3.0;
     let z = (a.mean - b.mean - bias) / a.error.hypot(b.error).hypot(bias_error);

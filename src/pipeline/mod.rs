@@ -61,6 +61,20 @@ impl Prepared {
     pub fn new(
         scene: Arc<Scene>,
         camera: &Camera,
+        settings: Settings,
+        progress: &Progress,
+        stats: &mut Stats,
+    ) -> Result<Prepared> {
+        Self::for_cameras(scene, std::slice::from_ref(camera), settings, progress, stats)
+    }
+
+    /// As [`Prepared::new`], for several cameras: what is chosen from the scene suits all of them.
+    ///
+    /// # Errors
+    /// As [`Prepared::new`].
+    pub fn for_cameras(
+        scene: Arc<Scene>,
+        cameras: &[Camera],
         mut settings: Settings,
         progress: &Progress,
         stats: &mut Stats,
@@ -69,12 +83,13 @@ impl Prepared {
         let backend = settings.backend.create(settings.threads)?;
         let start = Instant::now();
         let detailed = build_detailed(&scene, backend.as_ref())?;
-        let lights = Lights::new(&scene);
+        let mut lights = Lights::new(&scene);
+        lights.look_out(&scene, detailed.as_ref(), settings.seed);
         stats.seconds.build += start.elapsed().as_secs_f64();
         stats.backend = backend.name();
         stats.counts.triangles = scene.mesh.triangles.len() as u64;
 
-        auto::fill_in(&mut settings, &scene, detailed.as_ref(), camera);
+        auto::fill_in(&mut settings, &scene, detailed.as_ref(), cameras);
         let far = match settings.method {
             Method::Mcpt => None,
             Method::Gsii if settings.r_thresh() == f32::INFINITY => None,
@@ -177,7 +192,7 @@ pub fn simplify_only(
     let backend = settings.backend.create(settings.threads)?;
     if settings.r_thresh.is_none() || settings.patch_size.is_none() {
         let detailed = build_detailed(scene, backend.as_ref())?;
-        auto::fill_in(&mut settings, scene, detailed.as_ref(), camera);
+        auto::fill_in(&mut settings, scene, detailed.as_ref(), std::slice::from_ref(camera));
     }
     let simplified = simplify::simplify(scene, backend.as_ref(), &settings.simplify_params(), progress)?;
     stats.record_simplified(&simplified);

@@ -16,7 +16,8 @@ use std::time::{Duration, Instant};
 use rayon::prelude::*;
 
 pub use cache::IrradianceCache;
-pub use film::Film;
+use film::Tile;
+pub use film::{Film, Region};
 use integrator::{Batch, Workspace};
 pub use integrator::{FarField, PassTimes, RayCounts, World};
 pub use nearness::Nearness;
@@ -40,6 +41,8 @@ pub struct RenderParams {
     pub width: u32,
     /// Height in pixels.
     pub height: u32,
+    /// The part of the image to render; `None` for all of it. Pixels have the same bits as in the whole image.
+    pub region: Option<Region>,
     /// Fewest trials of a pixel in each pass.
     pub min_trials: u32,
     /// Most trials of a pixel in each pass; equal to `min_trials` for fixed sampling.
@@ -56,6 +59,18 @@ pub struct RenderParams {
     pub interpolate: bool,
     /// Seed: the same seed gives the same image, bit for bit, for any number of threads.
     pub seed: u32,
+}
+
+impl RenderParams {
+    /// The part of the image that is rendered.
+    pub fn region(&self) -> Region {
+        self.region.unwrap_or(Region::whole([self.width, self.height]))
+    }
+
+    /// An empty film of that part.
+    pub fn film(&self) -> Film {
+        Film::of(self.region(), [self.width, self.height])
+    }
 }
 
 /// What came out.
@@ -89,15 +104,15 @@ pub fn render(world: &World<'_>, camera: &Camera, params: &RenderParams, progres
     let world = &World { cache: cache.as_ref(), ..*world };
     let mut renderer = Renderer { world, camera, params, rays: RayCounts::default(), times: PassTimes::default() };
 
-    let mut film = Film::new(params.width, params.height);
+    let mut film = params.film();
     let plan = if params.min_trials == params.max_trials {
         vec![Allocation { hires: params.min_trials, lores: params.min_trials }; film.tiles.len()]
     } else {
-        let mut pilot = Film::new(params.width, params.height);
+        let mut pilot = plan::pilot_tiles(params.region(), params);
         let trials = plan::pilot_trials(params);
-        let all = vec![Allocation { hires: trials, lores: trials }; film.tiles.len()];
+        let all = vec![Allocation { hires: trials, lores: trials }; pilot.len()];
         renderer.round(&mut pilot, &all, 0..trials, hash_all(&[params.seed, PILOT]), &over, &|_| {});
-        plan::allocate(&pilot, params)
+        plan::allocate(&pilot, &film, params)
     };
 
     let planned: u64 = plan.iter().zip(&film.tiles).map(|(a, t)| u64::from(a.most()) * t.pixels.len() as u64).sum();
@@ -108,7 +123,7 @@ pub fn render(world: &World<'_>, camera: &Camera, params: &RenderParams, progres
     // Rounds double, so that there is a whole image early and prefixes of the point sets stay well distributed.
     while done < most && !stopped {
         let next = (2 * done).max(params.min_trials.max(1)).min(most);
-        stopped = renderer.round(&mut film, &plan, done..next, params.seed, &over, &|n| bar.inc(n));
+        stopped = renderer.round(&mut film.tiles, &plan, done..next, params.seed, &over, &|n| bar.inc(n));
         done = next;
     }
     bar.finish_and_clear();
@@ -129,7 +144,7 @@ impl Renderer<'_> {
     /// Adds the trials with numbers in `range` to every tile whose allocation has them. Returns whether it was cut short.
     fn round(
         &mut self,
-        film: &mut Film,
+        tiles: &mut [Tile],
         plan: &[Allocation],
         range: std::ops::Range<u32>,
         seed: u32,
@@ -138,7 +153,7 @@ impl Renderer<'_> {
     ) -> bool {
         let size = [self.params.width, self.params.height];
         let (world, camera, features) = (self.world, self.camera, self.params.features);
-        let work = film.tiles.par_iter_mut().zip(plan).map_init(Workspace::default, |ws, (tile, allocation)| {
+        let work = tiles.par_iter_mut().zip(plan).map_init(Workspace::default, |ws, (tile, allocation)| {
             (ws.counts, ws.times) = Default::default();
             let mut cut = false;
             for (trials, passes) in allocation.segments(range.clone()) {

@@ -14,7 +14,7 @@ use crate::simplify::TriangleSource;
 
 /// Renders radiosity plus emission of the first surface of `far`, `min_trials` rays a pixel; everything goes to HIRES.
 pub fn show_radiosity(world: &World<'_>, far: &FarField<'_>, camera: &Camera, params: &RenderParams) -> Film {
-    let mut film = Film::new(params.width, params.height);
+    let mut film = params.film();
     let view = ViewRays::new(camera, [params.width, params.height], params.seed);
     film.tiles.par_iter_mut().for_each(|tile| {
         let n = params.min_trials.max(1);
@@ -34,7 +34,7 @@ pub fn show_radiosity(world: &World<'_>, far: &FarField<'_>, camera: &Camera, pa
 
 fn radiance(world: &World<'_>, far: &FarField<'_>, ray: &Ray, hit: &Hit) -> Vec3 {
     if !hit.is_hit() {
-        return Vec3::ZERO;
+        return world.lights.outside(ray.direction);
     }
     let reflected = far.reflected(hit, ray.direction);
     match far.geometry.sources[hit.triangle as usize] {

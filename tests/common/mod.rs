@@ -118,6 +118,7 @@ pub fn fixed(width: u32, height: u32, trials: u32, seed: u32) -> RenderParams {
     RenderParams {
         width,
         height,
+        region: None,
         min_trials: trials,
         max_trials: trials,
         interpolate: false,
