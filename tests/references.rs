@@ -6,18 +6,18 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Arc;
 
-use common::{Estimate, fixed, prepare, render, shared, values};
+use common::{Estimate, fixed, interpolated, prepare, render, shared, values};
 use gsii::image::{self, Image};
 use gsii::pipeline::{Method, Settings};
-use gsii::render::Film;
+use gsii::render::{Film, RenderParams};
 use gsii::scene::{LoadOptions, load};
 
 const SIZE: u32 = 256;
 
-fn film(scene: &Path, method: Method, [width, height]: [u32; 2], trials: u32) -> Film {
+fn film(scene: &Path, method: Method, params: &RenderParams) -> Film {
     let scene = Arc::new(load(scene, &LoadOptions::default()).unwrap());
     let (prepared, _) = prepare(&scene, Settings { method, ..Settings::default() });
-    render(&prepared, &fixed(width, height, trials, 0)).film
+    render(&prepared, params).film
 }
 
 fn as_image(film: &Film) -> Image {
@@ -39,10 +39,10 @@ fn mean(image: &Image, inside: impl Fn(u32, u32) -> bool) -> f64 {
     sum / count
 }
 
-fn check_gsii(name: &str) {
+fn check_gsii(name: &str, params: &RenderParams) {
     let Some(shared) = shared() else { return };
     let reference = image::read(&shared.join(format!("refs/images/{name}.exr"))).unwrap();
-    let film = film(&shared.join(format!("scenes/{name}.glb")), Method::Gsii, [SIZE; 2], 256);
+    let film = film(&shared.join(format!("scenes/{name}.glb")), Method::Gsii, params);
     let metrics = image::compare(&reference, &as_image(&film)).unwrap();
     let ratio = Estimate::whole(&film).mean / mean(&reference, |_, _| true);
     println!("{name}: mean ratio {ratio:.5}, relMSE {:.3e}, bands {:?}", metrics.rel_mse, metrics.relative_bias);
@@ -52,12 +52,14 @@ fn check_gsii(name: &str) {
 
 #[test]
 fn gsii_agrees_with_the_reference_of_cornell() {
-    check_gsii("cornell");
+    check_gsii("cornell", &interpolated(SIZE, SIZE, 32, 0));
+    check_gsii("cornell", &fixed(SIZE, SIZE, 256, 0));
 }
 
 #[test]
 fn gsii_agrees_with_the_reference_of_clutter() {
-    check_gsii("clutter");
+    check_gsii("clutter", &interpolated(SIZE, SIZE, 32, 0));
+    check_gsii("clutter", &fixed(SIZE, SIZE, 256, 0));
 }
 
 /// Path tracing against a reference in one or two parts, whose own error is known when there are two: ratio of the means within 0.3 %
@@ -95,7 +97,7 @@ fn check_path_tracing(name: &str, film: &Film, reference: &[Image]) {
 fn path_tracing_agrees(name: &str) {
     let Some(shared) = shared() else { return };
     let reference = image::read(&shared.join(format!("refs/images/{name}.exr"))).unwrap();
-    let film = film(&shared.join(format!("scenes/{name}.glb")), Method::Mcpt, [SIZE; 2], 64);
+    let film = film(&shared.join(format!("scenes/{name}.glb")), Method::Mcpt, &fixed(SIZE, SIZE, 64, 0));
     check_path_tracing(name, &film, &[reference]);
 }
 
@@ -129,7 +131,7 @@ fn path_tracing_agrees_with_the_references_of_interiors() {
     let folder = tempfile::tempdir().unwrap();
     for name in INTERIORS {
         let (diffuse, halves) = interior(name, &shared, folder.path());
-        check_path_tracing(name, &film(&diffuse, Method::Mcpt, [256, 144], 64), &halves);
+        check_path_tracing(name, &film(&diffuse, Method::Mcpt, &fixed(256, 144, 64, 0)), &halves);
     }
 }
 
@@ -141,7 +143,7 @@ fn interiors_agree_with_their_references() {
     let mut off = Vec::new();
     for name in INTERIORS {
         let (diffuse, halves) = interior(name, &shared, folder.path());
-        let film = film(&diffuse, Method::Gsii, [256, 144], 256);
+        let film = film(&diffuse, Method::Gsii, &fixed(256, 144, 256, 0));
         let image = as_image(&film);
         let cross = image::compare_halves([&halves[0], &halves[1]], &image).unwrap();
         let reference = 0.5 * (mean(&halves[0], |_, _| true) + mean(&halves[1], |_, _| true));

@@ -8,9 +8,11 @@ mod common;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use common::{Estimate, cluttered_room, fixed, gltf, lit_room, prepare, render, scene, threshold, values};
+use common::{
+    Estimate, cluttered_room, fixed, gltf, interpolated, lit_room, prepare, render, scene, threshold, values,
+};
 use gsii::pipeline::{BackendKind, Method, Settings};
-use gsii::render::{RenderParams, bias};
+use gsii::render::{RenderParams, World, bias};
 
 const ALPHA: f64 = 1e-4;
 
@@ -30,7 +32,7 @@ fn image(settings: Settings, params: &RenderParams) -> Vec<f64> {
 #[test]
 fn the_number_of_threads_does_not_change_a_bit() {
     for method in [Method::Gsii, Method::Pmm, Method::Mcpt, Method::Radiosity] {
-        let adaptive = RenderParams { max_trials: 64, ..fixed(45, 30, 4, 0) };
+        let adaptive = RenderParams { max_trials: 64, ..interpolated(45, 30, 4, 0) };
         let images = [1, 2, 5].map(|threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| bits(&image(with(method), &adaptive)))
@@ -148,8 +150,15 @@ fn white_clutter_vanishes_in_a_furnace() {
         if (0.3..2.0).contains(&r_thresh) {
             assert!(stats.counts.complex > 0, "something is simplified at r_thresh {r_thresh}");
         }
+        // Interpolation between places that all see the same changes nothing, either.
+        let image = interpolated(36, 24, 16, 6);
+        let same = Estimate::whole(&render(&prepared, &image).film);
         let rendering = render(&prepared, &fixed(36, 24, 64, 5));
         let got = Estimate::whole(&rendering.film);
+        println!("r_thresh {r_thresh}: interpolated {same:?}, by pixel {got:?}");
+        // The noise of records is in no pixel's variance: hundreds of rays each, some hundred records.
+        let difference = (same.mean - got.mean).abs();
+        assert!(difference < 0.002 * exact + threshold(ALPHA, 5) * same.error.hypot(got.error), "{same:?} {got:?}");
         // The solution's own stated standard error belongs to all pixels together.
         let lores = rendering.film.mean(|p| p.lores.mean());
         let error = got.error.hypot(stats.error.radiosity * lores);
@@ -159,6 +168,29 @@ fn white_clutter_vanishes_in_a_furnace() {
         );
         let z = (got.mean - exact) / error;
         assert!(z.abs() < threshold(ALPHA, 5), "r_thresh {r_thresh}: {} is not {exact}, z = {z}", got.mean);
+    }
+}
+
+/// The bias meter, with the cache and without it, tells how far interpolation changes the mean of the image: not at all, to its
+/// standard error, or by less than half a percent.
+#[test]
+fn interpolation_keeps_the_mean() {
+    let room = scene(&lit_room());
+    let (prepared, _) = prepare(&room, with(Method::Gsii));
+    let images = [fixed(96, 72, 128, 3), interpolated(96, 72, 32, 4)].map(|params| render(&prepared, &params));
+    let cache = images[1].cache.as_ref().expect("GSII interpolates");
+    assert!(!cache.is_empty());
+    let lores = images.each_ref().map(|i| i.film.relative_errors().lores);
+    println!("{} records, noise of LORES {lores:?}", cache.len());
+    assert!(lores[1] < lores[0], "less noise with a quarter of the trials");
+    let world = World { cache: Some(cache), ..prepared.world() };
+    let camera = &prepared.scene.cameras[0];
+    let [without, with] = [prepared.world(), world].map(|world| bias::measure(&world, camera, 4.0 / 3.0, 1 << 16, 9));
+    for band in 0..3 {
+        let change = (with.mean[band] - without.mean[band]) / without.reference[band];
+        let error = with.standard_error[band].hypot(without.standard_error[band]) / without.reference[band];
+        println!("band {band}: {change:.5} +- {error:.5}");
+        assert!(change.abs() < 0.005 + threshold(ALPHA, 3) * error, "band {band}: {change} +- {error}");
     }
 }
 
@@ -193,7 +225,7 @@ fn gsii_is_path_tracing_plus_the_measured_bias() {
     let (mcpt, _) = prepare(&office, with(Method::Mcpt));
     let a = Estimate::whole(&render(&gsii, &fixed(48, 32, 128, 21)).film);
     let b = Estimate::whole(&render(&mcpt, &fixed(48, 32, 128, 22)).film);
-    let measured = bias::measure(&gsii.world(), &office.cameras[0], 1.5, 1 << 16, 23);
+    let measured = bias::measure(&gsii.world(), &office.cameras[0], &fixed(48, 32, 1, 23), 1 << 16);
     let bias = measured.mean.iter().sum::<f64>() / 3.0;
     let bias_error = measured.standard_error.iter().sum::<f64>() / 3.0;
     let z = (a.mean - b.mean - bias) / a.error.hypot(b.error).hypot(bias_error);

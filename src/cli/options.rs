@@ -33,7 +33,7 @@ impl FromStr for LengthOrAuto {
 pub struct SceneOptions {
     /// glTF 2.0 file (.glb or .gltf)
     pub scene: PathBuf,
-    /// Camera, by name or number (default: the first)
+    /// Camera, by name or number; 'gsii render' also takes 'all' [default: the first]
     #[arg(long, value_name = "NAME|INDEX")]
     pub camera: Option<String>,
 }

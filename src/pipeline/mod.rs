@@ -61,6 +61,20 @@ impl Prepared {
     pub fn new(
         scene: Arc<Scene>,
         camera: &Camera,
+        settings: Settings,
+        progress: &Progress,
+        stats: &mut Stats,
+    ) -> Result<Prepared> {
+        Self::for_cameras(scene, std::slice::from_ref(camera), settings, progress, stats)
+    }
+
+    /// As [`Prepared::new`], for several cameras: what is chosen from the scene suits all of them.
+    ///
+    /// # Errors
+    /// As [`Prepared::new`].
+    pub fn for_cameras(
+        scene: Arc<Scene>,
+        cameras: &[Camera],
         mut settings: Settings,
         progress: &Progress,
         stats: &mut Stats,
@@ -69,12 +83,13 @@ impl Prepared {
         let backend = settings.backend.create(settings.threads)?;
         let start = Stopwatch::start();
         let detailed = build_detailed(&scene, backend.as_ref())?;
-        let lights = Lights::new(&scene);
+        let mut lights = Lights::new(&scene);
+        lights.look_out(&scene, detailed.as_ref(), settings.seed);
         stats.record_time(start, |s| &mut s.build);
         stats.backend = backend.name();
         stats.counts.triangles = scene.mesh.triangles.len() as u64;
 
-        auto::fill_in(&mut settings, &scene, detailed.as_ref(), camera);
+        auto::fill_in(&mut settings, &scene, detailed.as_ref(), cameras);
         let far = match settings.method {
             Method::Mcpt => None,
             Method::Gsii if settings.r_thresh() == f32::INFINITY => None,
@@ -104,6 +119,7 @@ impl Prepared {
                 // Path tracing is the reference: nothing is blurred there.
                 least_roughness: if self.far.is_some() { self.settings.filter_glossy } else { 0.0 },
             },
+            cache: None,
             max_depth: self.settings.max_depth,
         }
     }
@@ -219,7 +235,7 @@ pub fn automatic(scene: &Arc<Scene>, camera: &Camera, mut settings: Settings) ->
     settings.check()?;
     let backend = settings.backend.create(settings.threads)?;
     let detailed = build_detailed(scene, backend.as_ref())?;
-    auto::fill_in(&mut settings, scene, detailed.as_ref(), camera);
+    auto::fill_in(&mut settings, scene, detailed.as_ref(), std::slice::from_ref(camera));
     Ok(settings)
 }
 

@@ -1,6 +1,7 @@
 //! Both render passes: HIRES (what the eye sees sharply) and LORES (indirect light), in one wavefront.
 
 pub mod bias;
+pub mod cache;
 pub mod film;
 pub mod integrator;
 pub mod layers;
@@ -14,7 +15,9 @@ use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 
-pub use film::Film;
+pub use cache::IrradianceCache;
+use film::Tile;
+pub use film::{Film, Region};
 use integrator::{Batch, Workspace};
 pub use integrator::{FarField, PassTimes, RayCounts, World};
 pub use nearness::Nearness;
@@ -39,6 +42,8 @@ pub struct RenderParams {
     pub width: u32,
     /// Height in pixels.
     pub height: u32,
+    /// The part of the image to render; `None` for all of it. Pixels have the same bits as in the whole image.
+    pub region: Option<Region>,
     /// Fewest trials of a pixel in each pass.
     pub min_trials: u32,
     /// Most trials of a pixel in each pass; equal to `min_trials` for fixed sampling.
@@ -51,8 +56,22 @@ pub struct RenderParams {
     pub time_limit: Option<Duration>,
     /// Whether to record albedo, normal and depth.
     pub features: bool,
+    /// Whether indirect light is interpolated between places (see [`cache`]), for GSII.
+    pub interpolate: bool,
     /// Seed: the same seed gives the same image, bit for bit, for any number of threads.
     pub seed: u32,
+}
+
+impl RenderParams {
+    /// The part of the image that is rendered.
+    pub fn region(&self) -> Region {
+        self.region.unwrap_or(Region::whole([self.width, self.height]))
+    }
+
+    /// An empty film of that part.
+    pub fn film(&self) -> Film {
+        Film::of(self.region(), [self.width, self.height])
+    }
 }
 
 /// What came out.
@@ -68,6 +87,8 @@ pub struct Rendering {
     pub cpu_times: PassTimes,
     /// Whether it was stopped before all planned trials were done.
     pub stopped: bool,
+    /// What indirect light was interpolated from.
+    pub cache: Option<IrradianceCache>,
 }
 
 /// What [`render_rounds`] shows after each round.
@@ -93,9 +114,11 @@ pub fn render_rounds(
     progress: &Progress,
     watch: &mut dyn FnMut(&Round<'_>) -> bool,
 ) {
+    let cache = irradiance_cache(world, camera, params, progress);
+    let world = &World { cache: cache.as_ref(), ..*world };
     let mut renderer = Renderer::new(world, camera, params);
-    let mut film = Film::new(params.width, params.height);
-    let plan = renderer.everywhere(&film, params.max_trials);
+    let mut film = params.film();
+    let plan = renderer.everywhere(film.tiles.len(), params.max_trials);
     let bar =
         progress.stage("rendering", u64::from(params.max_trials) * u64::from(params.width) * u64::from(params.height));
     renderer.rounds(&mut film, &plan, &|| progress.stopped(), &|n| bar.inc(n), watch);
@@ -110,17 +133,20 @@ pub fn render(world: &World<'_>, camera: &Camera, params: &RenderParams, progres
     let start = Stopwatch::start();
     let deadline = params.time_limit.map(|limit| Instant::now() + limit);
     let over = || progress.stopped() || deadline.is_some_and(|d| Instant::now() >= d);
+    let cache = irradiance_cache(world, camera, params, progress);
+    let filled = start.spent();
+    let world = &World { cache: cache.as_ref(), ..*world };
     let mut renderer = Renderer::new(world, camera, params);
 
-    let mut film = Film::new(params.width, params.height);
+    let mut film = params.film();
     let plan = if params.min_trials == params.max_trials {
-        renderer.everywhere(&film, params.min_trials)
+        renderer.everywhere(film.tiles.len(), params.min_trials)
     } else {
-        let mut pilot = Film::new(params.width, params.height);
+        let mut pilot = plan::pilot_tiles(params.region(), params);
         let trials = plan::pilot_trials(params);
-        let all = renderer.everywhere(&pilot, trials);
+        let all = renderer.everywhere(pilot.len(), trials);
         renderer.round(&mut pilot, &all, 0..trials, hash_all(&[params.seed, PILOT]), &over, &|_| {});
-        plan::allocate(&pilot, params)
+        plan::allocate(&pilot, &film, params)
     };
 
     let planned: u64 = plan.iter().zip(&film.tiles).map(|(a, t)| u64::from(a.most()) * t.pixels.len() as u64).sum();
@@ -128,9 +154,33 @@ pub fn render(world: &World<'_>, camera: &Camera, params: &RenderParams, progres
     let stopped = renderer.rounds(&mut film, &plan, &over, &|n| bar.inc(n), &mut |_| true);
     bar.finish_and_clear();
     let spent = start.spent();
-    let times = renderer.times.scaled_to(spent.wall_duration());
-    let cpu_times = renderer.times.scaled_to(spent.cpu_duration());
-    Rendering { film, rays: renderer.rays, times, cpu_times, stopped }
+    let times = renderer.times.after_cache(spent.wall_duration(), filled.wall_duration());
+    let cpu_times = renderer.times.after_cache(spent.cpu_duration(), filled.cpu_duration());
+    Rendering { film, rays: renderer.rays, times, cpu_times, stopped, cache }
+}
+
+/// Places that indirect light is interpolated between, where that is wanted and there is a far field beyond a near one.
+fn irradiance_cache(
+    world: &World<'_>,
+    camera: &Camera,
+    params: &RenderParams,
+    progress: &Progress,
+) -> Option<IrradianceCache> {
+    let two_fields = world.far.is_some_and(|far| far.r_thresh > 0.0 && far.r_thresh.is_finite());
+    let stage = progress.stage("irradiance cache", 0);
+    let size = [params.width, params.height];
+    let cache = (params.interpolate && two_fields).then(|| IrradianceCache::new(world, camera, size, params.seed));
+    stage.finish_and_clear();
+    cache
+}
+
+impl PassTimes {
+    /// The same shares of `total`, less what filling the irradiance cache took: that is LORES.
+    fn after_cache(self, total: Duration, filled: Duration) -> PassTimes {
+        let mut times = self.scaled_to(total.saturating_sub(filled));
+        times.lores += filled;
+        times
+    }
 }
 
 struct Renderer<'a> {
@@ -147,8 +197,8 @@ impl<'a> Renderer<'a> {
     }
 
     /// The plan that gives every pixel the same number of trials.
-    fn everywhere(&self, film: &Film, trials: u32) -> Vec<Allocation> {
-        vec![Allocation { hires: trials, lores: trials }; film.tiles.len()]
+    fn everywhere(&self, tiles: usize, trials: u32) -> Vec<Allocation> {
+        vec![Allocation { hires: trials, lores: trials }; tiles]
     }
 
     /// Carries out a plan in rounds. They double, so that there is a whole image early and prefixes of the point sets stay well
@@ -165,7 +215,7 @@ impl<'a> Renderer<'a> {
         let mut done = 0;
         while done < most {
             let next = (2 * done).max(self.params.min_trials.max(1)).min(most);
-            if self.round(film, plan, done..next, self.params.seed, over, advance) {
+            if self.round(&mut film.tiles, plan, done..next, self.params.seed, over, advance) {
                 return true;
             }
             done = next;
@@ -179,7 +229,7 @@ impl<'a> Renderer<'a> {
     /// Adds the trials with numbers in `range` to every tile whose allocation has them. Returns whether it was cut short.
     fn round(
         &mut self,
-        film: &mut Film,
+        tiles: &mut [Tile],
         plan: &[Allocation],
         range: std::ops::Range<u32>,
         seed: u32,
@@ -188,7 +238,7 @@ impl<'a> Renderer<'a> {
     ) -> bool {
         let size = [self.params.width, self.params.height];
         let (world, camera, features) = (self.world, self.camera, self.params.features);
-        let work = film.tiles.par_iter_mut().zip(plan).map_init(Workspace::default, |ws, (tile, allocation)| {
+        let work = tiles.par_iter_mut().zip(plan).map_init(Workspace::default, |ws, (tile, allocation)| {
             (ws.counts, ws.times) = Default::default();
             let mut cut = false;
             for (trials, passes) in allocation.segments(range.clone()) {

@@ -5,7 +5,6 @@ use std::time::Duration;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::film::Film;
 use super::integrator::{FarField, PassTimes, RayCounts, World};
 use super::view::ViewRays;
 use super::{RenderParams, Rendering};
@@ -18,7 +17,7 @@ use crate::simplify::TriangleSource;
 /// Renders radiosity plus emission of the first surface of `far`, `min_trials` rays a pixel; everything goes to HIRES.
 pub fn show_radiosity(world: &World<'_>, far: &FarField<'_>, camera: &Camera, params: &RenderParams) -> Rendering {
     let start = Stopwatch::start();
-    let mut film = Film::new(params.width, params.height);
+    let mut film = params.film();
     let view = ViewRays::new(camera, [params.width, params.height], params.seed);
     film.tiles.par_iter_mut().for_each(|tile| {
         let n = params.min_trials.max(1);
@@ -42,12 +41,13 @@ pub fn show_radiosity(world: &World<'_>, far: &FarField<'_>, camera: &Camera, pa
         times: all_hires(spent.wall_duration()),
         cpu_times: all_hires(spent.cpu_duration()),
         stopped: false,
+        cache: None,
     }
 }
 
 fn radiance(world: &World<'_>, far: &FarField<'_>, ray: &Ray, hit: &Hit) -> Vec3 {
     if !hit.is_hit() {
-        return Vec3::ZERO;
+        return world.lights.outside(ray.direction);
     }
     let reflected = far.reflected(hit, ray.direction);
     match far.geometry.sources[hit.triangle as usize] {

@@ -97,7 +97,8 @@ fn how() -> &'static str {
      in memory and includes acceleration structures, simplification and radiosity.</p>\
      <p><b>relMSE</b> is the mean over pixels and bands of (image \u{2212} reference)\u{b2} / (reference\u{b2} + 0.01 mean\u{b2}). The reference is path \
      traced in two halves with independent random numbers; the product of the differences to each half has the expectation of the squared error \
-     without the reference's own noise. Each image has two halves too: mixing those tells what more trials would not remove (its bias) from noise.</p>\
+     without the reference's own noise. Each image has two halves too: mixing those tells what more trials would not remove (its bias) from noise. What both halves share, the interpolated indirect light of GSII and its radiosity \
+     solution, counts as bias here, though part of it is noise of another kind.</p>\
      <p><b>Curves</b> come from one run for each setting whose trials double; the image after n trials is the one that a run with n trials gives. Seeds \
      of images and reference differ.</p>\
      <p>Thick lines: the methods as they are by default. Dashed: GSII with other settings.</p>"

@@ -26,6 +26,8 @@ pub enum Role {
     Pmm,
     /// GSII as it is by default.
     Gsii,
+    /// GSII without interpolation of indirect light.
+    Gather,
     /// GSII with another `r_thresh`.
     RThresh,
     /// GSII with another beta.
@@ -93,6 +95,8 @@ pub struct Run {
     pub patches: Patches,
     /// Its trials.
     pub sampling: Sampling,
+    /// Whether indirect light is interpolated between places: as by default, but not where the paper is followed.
+    pub interpolate: bool,
 }
 
 /// How much is run.
@@ -111,7 +115,7 @@ impl Run {
     /// Names what the run is a result of, compared with a reference of so many trials: two runs of the same key give the same result.
     pub fn key(&self, subject: &Subject, reference_trials: u32) -> String {
         let settings = serde_json::Value::Object(self.settings.parameters());
-        let what = (self.role, &self.label, self.patches, self.sampling, reference_trials);
+        let what = (self.role, &self.label, self.patches, self.sampling, self.interpolate, reference_trials);
         key(&format!("{} {settings} {what:?}", subject.view()))
     }
 
@@ -154,6 +158,7 @@ pub fn main_methods(base: &Settings, extent: Extent) -> Vec<Run> {
             settings: Settings { method, ..base.clone() },
             patches: Patches::Auto,
             sampling: Sampling::Rounds { most: extent.main_trials, rel_mse: ENOUGH },
+            interpolate: true,
         })
         .collect()
 }
@@ -172,8 +177,11 @@ pub fn ladder(subject: &Subject, base: &Settings, auto: f32, extent: Extent) -> 
     let shown = Sampling::Rounds { most: 16, rel_mse: 0.0 };
     let mut runs = main_methods(base, extent);
     let mut add = |role, label: &str, settings: Settings, patches, sampling| {
-        runs.push(Run { role, label: label.to_owned(), settings, patches, sampling });
+        let interpolate = ![Role::Gather, Role::PaperGsii, Role::PassGsii].contains(&role);
+        runs.push(Run { role, label: label.to_owned(), settings, patches, sampling, interpolate });
     };
+    let main = Sampling::Rounds { most: extent.main_trials, rel_mse: ENOUGH };
+    add(Role::Gather, "GSII, no interpolation", gsii.clone(), Patches::Auto, main);
     for factor in [0.5, 2.0, 4.0] {
         let settings = Settings { r_thresh: Some(factor * auto), ..gsii.clone() };
         add(Role::RThresh, &format!("GSII, r_thresh x {factor}"), settings, Patches::Auto, other);

@@ -73,12 +73,14 @@ pub fn make(
         let params = RenderParams {
             width: subject.size[0],
             height: subject.size[1],
+            region: None,
             min_trials: PASS,
             max_trials: PASS,
             hires_error: 1.0,
             lores_error: 1.0,
             time_limit: None,
             features: false,
+            interpolate: false,
             seed: hash_all(&[STREAM, reference.trials / PASS]),
         };
         let rendering = prepared.render(&subject.camera, &params, progress);

@@ -95,6 +95,7 @@ fn section(study: &Study, chapter: &Chapter, output: &Path) -> Result<Section> {
     let mut settled = Vec::new();
     let shown = [
         Role::Gsii,
+        Role::Gather,
         Role::AtPaperRThresh,
         Role::PaperGsii,
         Role::Pmm,
@@ -240,7 +241,7 @@ type Curve = Box<dyn Fn(&Record, &Point) -> Option<f64>>;
 
 fn curves(chapter: &Chapter) -> Vec<(&'static str, String)> {
     let main = [Role::Gsii, Role::Mcpt, Role::Pmm];
-    let others = [Role::AtPaperRThresh, Role::PaperGsii, Role::RThresh];
+    let others = [Role::Gather, Role::AtPaperRThresh, Role::PaperGsii, Role::RThresh];
     let lines = |roles: &[Role], first: usize, minor: bool, y: &Curve| -> Vec<Line> {
         let runs = roles.iter().flat_map(|role| chapter.records.iter().filter(move |r| r.role == *role));
         runs.enumerate()

@@ -240,7 +240,15 @@ fn crossings(chapters: &[Chapter<'_>]) -> Table {
                 let text = |role| or_dash(chapter.run(role).map(|r| of(r).text()));
                 let seconds = |role| chapter.run(role).and_then(|r| of(r).seconds());
                 let ratio = seconds(Role::Mcpt).zip(seconds(Role::Gsii)).map(|(a, b)| number(a / b));
-                let gsii = [Role::Gsii, Role::RThresh, Role::Beta, Role::Box, Role::AtPaperRThresh, Role::PaperGsii];
+                let gsii = [
+                    Role::Gsii,
+                    Role::Gather,
+                    Role::RThresh,
+                    Role::Beta,
+                    Role::Box,
+                    Role::AtPaperRThresh,
+                    Role::PaperGsii,
+                ];
                 let best = chapter
                     .records
                     .iter()

@@ -84,7 +84,7 @@ pub fn perform(
             let mut failed = None;
             let mut watch = Stopwatch::start();
             let mut rendering = Spent::default();
-            prepared.render_rounds(&subject.camera, &params(subject, 2, most, 0.0), progress, &mut |round| {
+            prepared.render_rounds(&subject.camera, &params(run, subject, 2, most, 0.0), progress, &mut |round| {
                 rendering += watch.spent();
                 let share = round.times.hires_share();
                 let result = keep.point(&record.key, round.film, rendering, share, round.rays);
@@ -108,7 +108,7 @@ pub fn perform(
         }
         Sampling::Paper => {
             let watch = Stopwatch::start();
-            let rendering = prepared.render(&subject.camera, &params(subject, 10, 30, 0.05), progress);
+            let rendering = prepared.render(&subject.camera, &params(run, subject, 10, 30, 0.05), progress);
             let share = rendering.times.hires_share();
             record.points.push(keep.point(&record.key, &rendering.film, watch.spent(), share, rendering.rays)?);
         }
@@ -116,16 +116,18 @@ pub fn perform(
     Ok((!progress.stopped()).then_some(record))
 }
 
-fn params(subject: &Subject, min_trials: u32, max_trials: u32, error: f32) -> RenderParams {
+fn params(run: &Run, subject: &Subject, min_trials: u32, max_trials: u32, error: f32) -> RenderParams {
     RenderParams {
         width: subject.size[0],
         height: subject.size[1],
+        region: None,
         min_trials,
         max_trials,
         hires_error: error,
         lores_error: error,
         time_limit: None,
         features: false,
+        interpolate: run.interpolate,
         seed: SEED,
     }
 }

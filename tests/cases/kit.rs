@@ -337,10 +337,12 @@ pub fn prepare(scene: &Arc<Scene>, settings: Settings) -> gsii::Result<Prepared>
 
 pub fn image(prepared: &Prepared, camera: &Camera, size: [u32; 2], trials: u32, seed: u32) -> Film {
     let params = RenderParams {
+        region: None,
         width: size[0],
         height: size[1],
         min_trials: trials,
         max_trials: trials,
+        interpolate: false,
         hires_error: 1.0,
         lores_error: 1.0,
         time_limit: None,

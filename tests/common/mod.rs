@@ -118,14 +118,21 @@ pub fn fixed(width: u32, height: u32, trials: u32, seed: u32) -> RenderParams {
     RenderParams {
         width,
         height,
+        region: None,
         min_trials: trials,
         max_trials: trials,
+        interpolate: false,
         hires_error: 0.05,
         lores_error: 0.05,
         time_limit: None,
         features: false,
         seed,
     }
+}
+
+/// As [`fixed`], with indirect light interpolated.
+pub fn interpolated(width: u32, height: u32, trials: u32, seed: u32) -> RenderParams {
+    RenderParams { interpolate: true, ..fixed(width, height, trials, seed) }
 }
 
 /// Everything before the first pixel, seen from the first camera.
