@@ -247,6 +247,7 @@ impl Settings {
             error: self.radiosity_error,
             seed: self.seed,
             ambient: true,
+            leave_out_covered: true,
             max_patches: 400_000,
         }
     }

@@ -287,10 +287,11 @@ pub fn simplify_params(r_thresh: f64, beta: f64, box_fit: BoxFit) -> SimplifyPar
     }
 }
 
-/// One patch a surface, light sources shoot: the paper's solver.
+/// One patch a surface, all of it, and light sources shoot: the paper's solver.
 pub fn one_patch(error: f64, seed: u32) -> RadiosityParams {
     RadiosityParams {
         unshot: 1e-4,
+        leave_out_covered: false,
         direct: DirectLight::Shoot,
         error: error as f32,
         seed,
