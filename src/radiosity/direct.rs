@@ -130,6 +130,9 @@ fn sample(
     index: u32,
     stream: u32,
 ) -> Option<(ShadowRay, DVec3)> {
+    if patches.is_inside_of_box(side) {
+        return None;
+    }
     let stream = sampling::hash_all(&[stream, side]);
     let s = sampling::sobol(index, 0, stream);
     let choice = sampling::sobol(index, 1, stream)[0];

@@ -359,7 +359,7 @@ fn rad_014_integrating_sphere(case: &Case, out: &mut Outcome<'_>) {
         };
         let caps = [("in the beam", cap(1.0), 100.0), ("behind", cap(-1.0), 0.0)];
         let measured = over_seeds(|seed| {
-            let params = RadiosityParams { patch_size: 0.5, direct: DirectLight::Shoot, ..one_patch(0.02, seed) };
+            let params = RadiosityParams { patch_size: 0.5, direct: DirectLight::Shoot, ..one_patch(0.05, seed) };
             let solution = room.solve(&params).unwrap();
             let of = |(_, cap, direct): &(&str, Vec<u32>, f64)| {
                 room.mean_of(&solution, cap).x / rho - direct / room.area(cap)
@@ -379,7 +379,7 @@ fn rad_015_area_mean(case: &Case, out: &mut Outcome<'_>) {
         model.point_light(10_000.0 / (4.0 * PI), DVec3::splat(2.0));
         let room = Room::new(model.finish());
         let measured = over_seeds(|seed| {
-            let params = RadiosityParams { patch_size: 0.5, ..one_patch(0.02, seed) };
+            let params = RadiosityParams { patch_size: 0.5, ..one_patch(0.05, seed) };
             let solution = room.solve(&params).unwrap();
             let direct = solution.ledger.emitted[0] / 96.0;
             let b = FACES.iter().map(|f| room.mean(&solution, f)).sum::<f64>() / 6.0;
@@ -432,7 +432,7 @@ fn converged(case: &Case, out: &mut Outcome<'_>, size: f64, rho: [f64; 6], e: f6
         patch_size: (size / 16.0) as f32,
         unshot: 1e-3,
         direct: DirectLight::Gather,
-        ..one_patch(0.02, seed)
+        ..one_patch(0.05, seed)
     };
     let measured = radiosities(&room, &FACES, &exitance, params);
     for (i, expected) in case.values("/B_mean").into_iter().enumerate() {
