@@ -40,6 +40,10 @@ const ROULETTE_DEPTH: u32 = 3;
 /// ... and after which even one that lost nothing may end: light can be trapped in glass for ever.
 const CERTAIN_DEPTH: u32 = 32;
 
+/// Largest probability of going on after that. Variance stays finite where it is above the square of the reflectance that keeps a
+/// path alive: between walls of 0.99, a smaller one makes rare paths arbitrarily bright.
+const CERTAIN_SURVIVAL: f32 = 0.999;
+
 /// Random numbers of one path: one block of four for the camera, then two for each scattering event.
 const BLOCKS_PER_EVENT: u32 = 2;
 
@@ -561,7 +565,7 @@ impl Workspace {
 
 /// Ends a path that brings little, or strengthens it by as much as others end; `u` in 0..1. Nothing is lost on average.
 fn roulette(path: Path, u: f32) -> Option<Path> {
-    let most = if path.depth < CERTAIN_DEPTH { 1.0 } else { 0.95 };
+    let most = if path.depth < CERTAIN_DEPTH { 1.0 } else { CERTAIN_SURVIVAL };
     let survival = if path.depth < ROULETTE_DEPTH { 1.0 } else { path.throughput.max_element().min(most) };
     (u < survival).then_some(Path { throughput: path.throughput / survival, ..path })
 }

@@ -386,7 +386,7 @@ fn gsii_014_white_clutter(case: &Case, out: &mut Outcome<'_>) {
         let nearest = e.mean.clamp(low, high);
         out.mean(what, nearest, e, pixel("sigma") * e.error + pixel("bias_rel") * high);
     };
-    let camera = look_at(&scene, v(0.5, 0.5, 0.0), v(0.3, 0.2, 1.0), 0.9, 0.3);
+    let camera = look_at(&scene, v(0.5, 0.5, 0.0), v(0.3, 0.2, 1.0), 0.9, 0.2);
     for fit in [BoxFit::Flux, BoxFit::Paper1993] {
         for r in [0.0, 0.05, 0.3, 1.0, 1e30] {
             if (r == 0.0 || r > 2.0) && fit == BoxFit::Paper1993 {

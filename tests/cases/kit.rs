@@ -248,7 +248,7 @@ impl Room {
     /// Area-weighted mean radiosity without emission of the fronts of triangles. Exact for triangles that lie in one patch;
     /// otherwise a midpoint rule over 4096 parts of each, fewer where there are thousands.
     pub fn mean_of(&self, solution: &Solution, triangles: &[u32]) -> DVec3 {
-        let n = ((50_000.0 / triangles.len() as f64).sqrt() as u32).clamp(1, 64);
+        let n = ((1e6 / triangles.len() as f64).sqrt() as u32).clamp(1, 64);
         let parts = f64::from(n * (n + 1) / 2) + f64::from(n * (n - 1) / 2);
         let mut sum = DVec3::ZERO;
         for &t in triangles {

@@ -440,7 +440,7 @@ fn converged(case: &Case, out: &mut Outcome<'_>, size: f64, rho: [f64; 6], e: f6
         out.mean(&what, expected, measured[i], case.tolerance("/mean_B_rel") * expected);
     }
     let rho_of = |face: &str| rho[FACES.iter().position(|f| *f == face).unwrap()];
-    let h = irradiance_at(&model, size, rho_of, points, &mcpt(), 1 << 13, Part::All);
+    let h = irradiance_at(&model, size, rho_of, points, &mcpt(), 1 << 14, Part::All);
     for ((point, h), expected) in points.iter().zip(h).zip(case.values("/H_points")) {
         out.pixel(&format!("H at {point:?} by path tracing"), expected, h);
     }
