@@ -43,14 +43,28 @@ pub(super) struct AreaLight {
     area: f64,
     /// The triangle, or both of a rectangle (the second `Hit::NONE` for a triangle).
     pub triangles: [u32; 2],
-    /// Which of its three corners a triangle of a rectangle has at its right angle.
-    right_corner: [u8; 2],
+    /// What only rectangles have.
+    rectangle: Option<RectangleFrame>,
     /// Mean emitted radiance.
     pub radiance: Vec3,
     /// Whether the radiance differs from point to point.
     varies: bool,
     /// Whether the clockwise side emits, too.
     pub both_faces: bool,
+}
+
+/// What is known of a rectangle before it is seen from anywhere.
+#[derive(Clone, Copy, Debug)]
+struct RectangleFrame {
+    /// Unit vectors along the edges.
+    x: DVec3,
+    y: DVec3,
+    /// Unit normal of the counter-clockwise side.
+    normal: DVec3,
+    /// Lengths of the edges.
+    lengths: [f64; 2],
+    /// Which of its three corners each triangle has at its right angle.
+    right_corner: [u8; 2],
 }
 
 /// A point on a light source.
@@ -74,7 +88,7 @@ enum View {
 impl AreaLight {
     /// Whether it is made of two triangles.
     pub(super) fn is_rectangle(&self) -> bool {
-        self.triangles[1] != Hit::NONE
+        self.rectangle.is_some()
     }
 
     /// Area in square scene units.
@@ -170,13 +184,9 @@ impl AreaLight {
         if (self.centre - position).length_squared() > FAR_SQUARED * self.radius * self.radius {
             return Some(View::Area);
         }
-        let (view, angle) = if self.is_rectangle() {
-            let lengths = self.edges.map(DVec3::length);
-            let x = self.edges[0] / lengths[0];
-            let normal = self.normal();
-            let y = normal.cross(x);
+        let (view, angle) = if let Some(RectangleFrame { x, y, normal, lengths, .. }) = self.rectangle {
             let (x0, y0) = (corner.dot(x), corner.dot(y));
-            let z = side.abs() / self.area;
+            let z = corner.dot(normal).abs();
             let rectangle = Rectangle { x: [x0, x0 + lengths[0]], y: [y0, y0 + lengths[1]], z };
             let angle = rectangle.solid_angle();
             (View::Rectangle(rectangle, DMat3::from_cols(x, y, -side.signum() * normal), angle), angle)
@@ -195,13 +205,13 @@ impl AreaLight {
     /// The point `corner + s e0 + t e1`.
     fn at(&self, [s, t]: [f64; 2]) -> AreaPoint {
         let position = self.corner + s * self.edges[0] + t * self.edges[1];
-        if !self.is_rectangle() {
+        let Some(frame) = &self.rectangle else {
             return AreaPoint { position, triangle: self.triangles[0], uv: Vec2::new(s as f32, t as f32) };
-        }
+        };
         // Weights of the right-angled corner and, counter-clockwise, of the other two
         let half = usize::from(s + t > 1.0);
         let weights = if half == 0 { [1.0 - s - t, s, t] } else { [s + t - 1.0, 1.0 - s, 1.0 - t] };
-        let right = usize::from(self.right_corner[half]);
+        let right = usize::from(frame.right_corner[half]);
         let weight = |vertex: usize| weights[(vertex + 3 - right) % 3] as f32;
         AreaPoint { position, triangle: self.triangles[half], uv: Vec2::new(weight(1), weight(2)) }
     }
@@ -283,7 +293,7 @@ fn triangle_light(scene: &Scene, triangle: u32) -> Option<AreaLight> {
         radius,
         area,
         triangles: [triangle, Hit::NONE],
-        right_corner: [0; 2],
+        rectangle: None,
         radiance,
         varies: varies(material),
         both_faces: material.double_sided,
@@ -402,6 +412,9 @@ fn rectangle_light(scene: &Scene, first: &AreaLight, second: &AreaLight, right_c
     let cross = edges[0].cross(edges[1]);
     let mean = (first.radiance.as_dvec3() * first.area + second.radiance.as_dvec3() * second.area)
         / (first.area + second.area);
+    let lengths = edges.map(DVec3::length);
+    let x = edges[0] / lengths[0];
+    let normal = cross.normalize();
     AreaLight {
         corner: a,
         edges,
@@ -410,7 +423,7 @@ fn rectangle_light(scene: &Scene, first: &AreaLight, second: &AreaLight, right_c
         radius: 0.5 * b.distance(c),
         area: cross.length(),
         triangles: [first.triangles[0], second.triangles[0]],
-        right_corner,
+        rectangle: Some(RectangleFrame { x, y: normal.cross(x), normal, lengths, right_corner }),
         radiance: mean.as_vec3(),
         varies: first.varies,
         both_faces: first.both_faces,

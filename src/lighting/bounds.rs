@@ -138,10 +138,6 @@ pub(super) struct Emitter {
 }
 
 impl Emitter {
-    /// Emits nothing.
-    pub(super) const NOTHING: Emitter =
-        Emitter { centre: Vec3::ZERO, radius: 0.0, cone: Cone::SPHERE, power: 0.0, flat: false };
-
     /// From bounds: the sphere around the box.
     pub(super) fn of(bounds: &Bounds) -> Emitter {
         Emitter {
@@ -152,43 +148,105 @@ impl Emitter {
             flat: false,
         }
     }
+}
 
-    /// Estimate of the irradiance at `position` on a surface with unit `normal` (zero: on any), occlusion left out. Zero
-    /// only where nothing can arrive.
-    pub(super) fn importance(&self, position: Vec3, normal: Vec3) -> f32 {
-        let offset = position - self.centre;
-        let d2 = offset.length_squared();
-        let r2 = self.radius * self.radius;
-        // The margin keeps points whose side is lost in rounding
-        let height = offset.dot(self.cone.axis);
-        if self.flat && !self.cone.both && height < 0.0 && height * height > SIDE_MARGIN * SIDE_MARGIN * d2 {
-            return 0.0;
-        }
-        let estimate = self.power / d2.max(r2).max(MIN_DISTANCE_SQUARED);
-        if d2 <= r2.max(MIN_DISTANCE_SQUARED) {
-            return estimate;
-        }
-        let inverse = 1.0 / d2.sqrt();
-        let away = offset * inverse;
-        let sin_b = self.radius * inverse;
-        let cos_b = (1.0 - sin_b * sin_b).max(0.0).sqrt();
+/// Number of emitters whose importance is estimated together.
+pub(super) const LANES: usize = 8;
 
-        let cone = &self.cone;
-        let cos_w = if cone.both { away.dot(cone.axis).abs() } else { away.dot(cone.axis) };
-        let sin = |cos: f32| (1.0 - cos * cos).max(0.0).sqrt();
-        let cos_x = cos_of_difference(cos_w, sin(cos_w), cone.cos_o, sin(cone.cos_o));
-        let cos_p = cos_of_difference(cos_x, sin(cos_x), cos_b, sin_b);
-        // Not `<=`: inside a spot's cone both are 1
-        if cos_p < cone.cos_e {
-            return 0.0;
+/// Eight emitters side by side, each quantity an array over them: compilers turn the loop over lanes into vector instructions.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(32))]
+pub(super) struct Emitters {
+    centre: [[f32; LANES]; 3],
+    axis: [[f32; LANES]; 3],
+    radius: [f32; LANES],
+    /// Zero in lanes without an emitter.
+    power: [f32; LANES],
+    cos_o: [f32; LANES],
+    sin_o: [f32; LANES],
+    cos_e: [f32; LANES],
+    /// Squared sine of the angle below the plane from which nothing arrives; infinite where light leaves to the back, too.
+    dark: [f32; LANES],
+    /// One where light leaves into the opposite directions, too; else zero.
+    both: [f32; LANES],
+}
+
+impl Emitters {
+    /// No emitter in any lane.
+    pub(super) const NOTHING: Emitters = Emitters {
+        centre: [[0.0; LANES]; 3],
+        axis: [[0.0; LANES]; 3],
+        radius: [0.0; LANES],
+        power: [0.0; LANES],
+        cos_o: [1.0; LANES],
+        sin_o: [0.0; LANES],
+        cos_e: [1.0; LANES],
+        dark: [f32::INFINITY; LANES],
+        both: [0.0; LANES],
+    };
+
+    /// Puts an emitter into a lane.
+    pub(super) fn set(&mut self, lane: usize, emitter: &Emitter) {
+        let cone = &emitter.cone;
+        for axis in 0..3 {
+            self.centre[axis][lane] = emitter.centre[axis];
+            self.axis[axis][lane] = cone.axis[axis];
         }
-        if normal == Vec3::ZERO {
-            return estimate * cos_p;
-        }
-        let cos_i = -away.dot(normal);
-        let cos_r = cos_of_difference(cos_i, sin(cos_i), cos_b, sin_b);
-        if cos_r > 0.0 { estimate * cos_p * cos_r } else { 0.0 }
+        self.radius[lane] = emitter.radius;
+        self.power[lane] = emitter.power;
+        self.cos_o[lane] = cone.cos_o;
+        self.sin_o[lane] = sin(cone.cos_o);
+        self.cos_e[lane] = cone.cos_e;
+        let one_sided = emitter.flat && !cone.both;
+        self.dark[lane] = if one_sided { SIDE_MARGIN * SIDE_MARGIN } else { f32::INFINITY };
+        self.both[lane] = f32::from(u8::from(cone.both));
     }
+
+    /// Estimates of the irradiance at `position` on a surface with unit `normal` (zero: on any), occlusion left out. Zero
+    /// only where nothing can arrive.
+    pub(super) fn importance(&self, position: Vec3, normal: Vec3) -> [f32; LANES] {
+        let mut importance = [0.0; LANES];
+        let any_side = f32::from(u8::from(normal == Vec3::ZERO));
+        for (i, value) in importance.iter_mut().enumerate() {
+            let x = position.x - self.centre[0][i];
+            let y = position.y - self.centre[1][i];
+            let z = position.z - self.centre[2][i];
+            let d2 = x * x + y * y + z * z;
+            let radius = self.radius[i];
+            let r2 = radius * radius;
+            let near = d2 <= larger(r2, MIN_DISTANCE_SQUARED);
+            let estimate = self.power[i] / larger(larger(d2, r2), MIN_DISTANCE_SQUARED);
+            // Inside the sphere the angles mean nothing, and are not used
+            let inverse = 1.0 / larger(d2, MIN_DISTANCE_SQUARED).sqrt();
+            let height = x * self.axis[0][i] + y * self.axis[1][i] + z * self.axis[2][i];
+            // The margin keeps points whose side is lost in rounding
+            let behind = height < 0.0 && height * height > self.dark[i] * d2;
+            let sin_b = radius * inverse;
+            let cos_b = sin(sin_b);
+            let along = height * inverse;
+            let cos_w = if self.both[i] > 0.0 { along.abs() } else { along };
+            let cos_x = cos_of_difference(cos_w, sin(cos_w), self.cos_o[i], self.sin_o[i]);
+            let cos_p = cos_of_difference(cos_x, sin(cos_x), cos_b, sin_b);
+            let cos_i = -(x * normal.x + y * normal.y + z * normal.z) * inverse;
+            let cos_r = larger(cos_of_difference(cos_i, sin(cos_i), cos_b, sin_b), any_side);
+            // Not `<=`: inside a spot's cone both are 1
+            let dark = cos_p < self.cos_e[i] || cos_r <= 0.0;
+            let outside = if dark { 0.0 } else { estimate * cos_p * cos_r };
+            let value_here = if near { estimate } else { outside };
+            *value = if behind { 0.0 } else { value_here };
+        }
+        importance
+    }
+}
+
+/// The sine that belongs to a cosine, or the other way round.
+fn sin(cos: f32) -> f32 {
+    larger(1.0 - cos * cos, 0.0).sqrt()
+}
+
+/// As `f32::max`, for numbers: one instruction.
+fn larger(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
 }
 
 /// `cos(max(0, a - b))` for angles in 0..pi.

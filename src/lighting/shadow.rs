@@ -37,28 +37,48 @@ pub fn light_visibility(
     sources: Option<&[TriangleSource]>,
     batch: &[ShadowRay],
     coherence: Coherence,
+    buffers: &mut ShadowBuffers,
     through: &mut [Vec3],
 ) {
-    let panes = scene.mesh.objects.iter().any(|o| o.kind == PartKind::Pane);
+    // Kinds are in order, see `Mesh`.
+    let panes = scene.mesh.objects.last().is_some_and(|o| o.kind == PartKind::Pane);
     let visible = if panes { Visible::WithoutPanes } else { Visible::All };
-    let before: Vec<Ray> = batch.iter().map(ShadowRay::before_light).collect();
-    let mut occluded = vec![false; batch.len()];
-    rays.occluded(&before, visible, coherence, &mut occluded);
-    for (share, blocked) in through.iter_mut().zip(&occluded) {
-        *share = if *blocked { Vec3::ZERO } else { Vec3::ONE };
+    let ShadowBuffers { before, occluded, at_light, last, hits } = buffers;
+    before.clear();
+    before.extend(batch.iter().map(ShadowRay::before_light));
+    occluded.resize(batch.len(), false);
+    rays.occluded(before, visible, coherence, occluded);
+    at_light.clear();
+    last.clear();
+    for (i, shadow) in batch.iter().enumerate() {
+        through[i] = if occluded[i] { Vec3::ZERO } else { Vec3::ONE };
+        if !occluded[i] && shadow.light != Hit::NONE {
+            at_light.push(i as u32);
+            last.push(shadow.around_light());
+        }
     }
-    let at_light: Vec<usize> = (0..batch.len()).filter(|&i| !occluded[i] && batch[i].light != Hit::NONE).collect();
-    let last: Vec<Ray> = at_light.iter().map(|&i| batch[i].around_light()).collect();
-    let mut hits = vec![Hit::MISS; last.len()];
-    rays.closest(&last, visible, coherence, &mut hits);
-    for (&i, hit) in at_light.iter().zip(&hits) {
+    hits.resize(last.len(), Hit::MISS);
+    rays.closest(last, visible, coherence, hits);
+    for (&i, hit) in at_light.iter().zip(hits.iter()) {
+        let i = i as usize;
         if !reaches(scene, sources, &batch[i], hit) {
             through[i] = Vec3::ZERO;
         }
     }
     if panes {
-        pass_panes(rays, scene, sources, &before, through);
+        pass_panes(rays, scene, sources, before, through);
     }
+}
+
+/// Memory of [`light_visibility`], to be used again for the next batch.
+#[derive(Debug, Default)]
+pub struct ShadowBuffers {
+    before: Vec<Ray>,
+    occluded: Vec<bool>,
+    /// Numbers of the rays that arrive at their light, as far as the first look tells, and the ends of these rays.
+    at_light: Vec<u32>,
+    last: Vec<Ray>,
+    hits: Vec<Hit>,
 }
 
 impl ShadowRay {

@@ -2,17 +2,11 @@
 
 use glam::Vec3;
 
-use super::bounds::{Bounds, BoundsSum, Emitter};
+use super::bounds::{Bounds, BoundsSum, Emitter, Emitters, LANES};
 use crate::scene::Aabb;
 
-/// Up to so many lights are compared one by one.
-const FLAT: usize = 16;
-/// Lights in a leaf of a larger tree.
-const LEAF: usize = 4;
 /// Candidate planes an axis.
 const BUCKETS: usize = 12;
-/// Index of no node.
-const NONE: u32 = u32::MAX;
 
 /// A light as the tree sees it.
 #[derive(Clone, Copy, Debug)]
@@ -22,40 +16,39 @@ pub(super) struct Leaf {
     pub emitter: Emitter,
 }
 
+/// What is in a lane of a node.
 #[derive(Clone, Copy, Debug)]
-struct Node {
-    emitter: Emitter,
-    parent: u32,
-    /// Inner nodes: the first child, the second comes right after it. Leaves: the first slot.
-    index: u32,
-    /// Number of lights in a leaf; 0 for inner nodes.
-    count: u32,
+enum Child {
+    Nothing,
+    Light(u32),
+    Node(u32),
 }
 
-impl Node {
-    const NEW: Node = Node { emitter: Emitter::NOTHING, parent: NONE, index: 0, count: 0 };
+/// Up to eight lights or groups of lights.
+#[derive(Clone, Debug)]
+struct Node {
+    emitters: Emitters,
+    children: [Child; LANES],
+    /// Node and lane that this node is in; of the root without meaning.
+    parent: [u32; 2],
 }
 
 /// Chooses lights in proportion to their estimated importance.
 #[derive(Debug, Default)]
 pub(super) struct LightTree {
+    /// The root comes first.
     nodes: Vec<Node>,
-    /// Lights in the order of the leaves.
-    emitters: Vec<Emitter>,
-    light_of_slot: Vec<u32>,
-    /// By light: its slot, and the leaf that holds it.
-    slot_of_light: Vec<[u32; 2]>,
+    /// By light: the node and lane that it is in.
+    place: Vec<[u32; 2]>,
 }
 
 impl LightTree {
     /// A tree over lights numbered `0..leaves.len()`.
     pub(super) fn new(leaves: &[Leaf]) -> Self {
-        let mut tree = LightTree { slot_of_light: vec![[0; 2]; leaves.len()], ..LightTree::default() };
+        let mut tree = LightTree { place: vec![[0; 2]; leaves.len()], ..LightTree::default() };
         if !leaves.is_empty() {
-            let limit = if leaves.len() <= FLAT { FLAT } else { LEAF };
             let mut order: Vec<u32> = (0..leaves.len() as u32).collect();
-            tree.nodes.push(Node::NEW);
-            tree.build(leaves, &mut order, 0, limit);
+            tree.build(leaves, &mut order, [0; 2]);
         }
         tree
     }
@@ -69,114 +62,111 @@ impl LightTree {
     pub(super) fn reaches(&self, position: Vec3, normal: Vec3) -> bool {
         match self.nodes.first() {
             None => false,
-            Some(root) => self.emitters.len() == 1 || root.emitter.importance(position, normal) > 0.0,
+            Some(root) => self.place.len() == 1 || sum(&root.emitters.importance(position, normal)) > 0.0,
         }
     }
 
-    fn build(&mut self, leaves: &[Leaf], order: &mut [u32], number: usize, limit: usize) {
-        let bounds = Bounds::around(order.iter().map(|&i| &leaves[i as usize].bounds));
-        self.nodes[number].emitter = Emitter::of(&bounds);
-        if order.len() <= limit {
-            self.nodes[number].index = self.emitters.len() as u32;
-            self.nodes[number].count = order.len() as u32;
-            for &light in order.iter() {
-                self.slot_of_light[light as usize] = [self.emitters.len() as u32, number as u32];
-                self.emitters.push(leaves[light as usize].emitter);
-                self.light_of_slot.push(light);
-            }
-            return;
+    /// Appends the node over `order` and all nodes below; returns its number.
+    fn build(&mut self, leaves: &[Leaf], order: &mut [u32], parent: [u32; 2]) -> u32 {
+        let number = self.nodes.len() as u32;
+        self.nodes.push(Node { emitters: Emitters::NOTHING, children: [Child::Nothing; LANES], parent });
+        for (lane, group) in groups(leaves, order).into_iter().enumerate() {
+            let (emitter, child) = if let [light] = *group {
+                self.place[light as usize] = [number, lane as u32];
+                (leaves[light as usize].emitter, Child::Light(light))
+            } else {
+                let emitter = Emitter::of(&bounds(leaves, group));
+                (emitter, Child::Node(self.build(leaves, group, [number, lane as u32])))
+            };
+            let node = &mut self.nodes[number as usize];
+            node.emitters.set(lane, &emitter);
+            node.children[lane] = child;
         }
-        let child = self.nodes.len();
-        self.nodes[number].index = child as u32;
-        self.nodes.extend([Node { parent: number as u32, ..Node::NEW }; 2]);
-        let middle = split(leaves, order);
-        let (first, second) = order.split_at_mut(middle);
-        self.build(leaves, first, child, limit);
-        self.build(leaves, second, child + 1, limit);
+        number
     }
 
     /// Chooses a light with `u` in 0..1; returns it with its probability.
     pub(super) fn sample(&self, position: Vec3, normal: Vec3, mut u: f64) -> Option<(u32, f64)> {
-        if self.emitters.len() == 1 {
+        if self.place.len() == 1 {
             return Some((0, 1.0));
         }
         let mut probability = 1.0;
         let mut node = self.nodes.first()?;
-        while node.count == 0 {
-            let child = node.index as usize;
-            let [p0, p1] = self.shares(child, position, normal)?;
-            let number = if u < p0 {
-                u /= p0;
-                probability *= p0;
-                child
-            } else {
-                u = ((u - p0) / p1).min(1.0 - f64::EPSILON);
-                probability *= p1;
-                child + 1
-            };
-            node = &self.nodes[number];
-        }
-        let mut importance = [0.0_f32; FLAT];
-        let count = node.count as usize;
-        let slots = &self.emitters[node.index as usize..][..count];
-        let mut sum = 0.0;
-        for (value, emitter) in importance.iter_mut().zip(slots) {
-            *value = emitter.importance(position, normal);
-            sum += f64::from(*value);
-        }
-        if sum <= 0.0 {
-            return None;
-        }
-        let mut rest = u * sum;
-        // The last that is not zero, should rounding let the sum run out
-        let mut chosen = None;
-        for (i, &value) in importance[..count].iter().enumerate() {
-            if value > 0.0 {
-                chosen = Some((i, f64::from(value)));
-                if rest < f64::from(value) {
-                    break;
+        loop {
+            let importance = node.emitters.importance(position, normal);
+            let total = sum(&importance);
+            if total <= 0.0 {
+                return None;
+            }
+            let mut rest = u * total;
+            // The last that is not zero, should rounding let the total run out
+            let mut chosen = None;
+            for (lane, &value) in importance.iter().enumerate() {
+                let value = f64::from(value);
+                if value > 0.0 {
+                    chosen = Some((lane, value, rest));
+                    if rest < value {
+                        break;
+                    }
+                    rest -= value;
                 }
-                rest -= f64::from(value);
+            }
+            let (lane, value, rest) = chosen?;
+            probability *= value / total;
+            u = (rest / value).min(1.0 - f64::EPSILON);
+            match node.children[lane] {
+                Child::Nothing => return None,
+                Child::Light(light) => return Some((light, probability)),
+                Child::Node(number) => node = &self.nodes[number as usize],
             }
         }
-        let (i, value) = chosen?;
-        Some((self.light_of_slot[node.index as usize + i], probability * value / sum))
     }
 
     /// Probability with which [`LightTree::sample`] chooses `light`.
     pub(super) fn probability(&self, position: Vec3, normal: Vec3, light: u32) -> f64 {
-        if self.emitters.len() == 1 {
+        if self.place.len() == 1 {
             return 1.0;
         }
-        let [slot, mut number] = self.slot_of_light[light as usize];
-        let leaf = &self.nodes[number as usize];
-        let sum: f64 = self.emitters[leaf.index as usize..][..leaf.count as usize]
-            .iter()
-            .map(|e| f64::from(e.importance(position, normal)))
-            .sum();
-        let mut probability = f64::from(self.emitters[slot as usize].importance(position, normal));
-        if probability == 0.0 {
-            return 0.0;
-        }
-        probability /= sum;
-        while number != 0 && probability > 0.0 {
-            let parent = self.nodes[number as usize].parent;
-            let child = self.nodes[parent as usize].index;
-            let Some(shares) = self.shares(child as usize, position, normal) else {
+        let [mut number, mut lane] = self.place[light as usize];
+        let mut probability = 1.0;
+        loop {
+            let node = &self.nodes[number as usize];
+            let importance = node.emitters.importance(position, normal);
+            let value = f64::from(importance[lane as usize]);
+            if value <= 0.0 {
                 return 0.0;
-            };
-            probability *= shares[(number - child) as usize];
-            number = parent;
+            }
+            probability *= value / sum(&importance);
+            if number == 0 {
+                return probability;
+            }
+            [number, lane] = node.parent;
         }
-        probability
     }
+}
 
-    /// How probable the two children starting at `child` are.
-    fn shares(&self, child: usize, position: Vec3, normal: Vec3) -> Option<[f64; 2]> {
-        let [a, b] = [child, child + 1].map(|c| f64::from(self.nodes[c].emitter.importance(position, normal)));
-        let sum = a + b;
-        (sum > 0.0).then(|| [a / sum, b / sum])
+fn sum(importance: &[f32; LANES]) -> f64 {
+    importance.iter().map(|&v| f64::from(v)).sum()
+}
+
+fn bounds(leaves: &[Leaf], group: &[u32]) -> Bounds {
+    Bounds::around(group.iter().map(|&i| &leaves[i as usize].bounds))
+}
+
+/// At most [`LANES`] groups: the most costly is cut in two until there are as many, or each is one light.
+fn groups<'a>(leaves: &[Leaf], order: &'a mut [u32]) -> Vec<&'a mut [u32]> {
+    let cost = |group: &[u32]| if group.len() > 1 { bounds(leaves, group).cost() } else { 0.0 };
+    let mut groups = vec![(cost(order), order)];
+    while groups.len() < LANES {
+        let many = groups.iter().enumerate().filter(|(_, (_, group))| group.len() > 1);
+        let Some((costliest, _)) = many.max_by(|(_, (a, _)), (_, (b, _))| a.total_cmp(b)) else { break };
+        let (_, group) = groups.remove(costliest);
+        let middle = split(leaves, group);
+        let (first, second) = group.split_at_mut(middle);
+        groups.insert(costliest, (cost(second), second));
+        groups.insert(costliest, (cost(first), first));
     }
+    groups.into_iter().map(|(_, group)| group).collect()
 }
 
 /// Sorts the lights into two groups and returns the size of the first: the cheapest of the planes between buckets, or halves

@@ -7,7 +7,7 @@ use super::RadiosityScene;
 use super::patches::Patches;
 use super::shoot::side_normal;
 use crate::backend::{Coherence, Ray};
-use crate::lighting::shadow::{ShadowRay, light_visibility};
+use crate::lighting::shadow::{ShadowBuffers, ShadowRay, light_visibility};
 use crate::sampling;
 
 /// Samples a side gets before it is known how much it varies ...
@@ -101,7 +101,8 @@ fn estimate(input: &RadiosityScene<'_>, patches: &Patches, counts: &[u32], strea
             }
             let mut through = vec![glam::Vec3::ONE; rays.len()];
             let sources = Some(input.geometry.sources.as_slice());
-            light_visibility(input.rays, input.scene, sources, &rays, Coherence::Coherent, &mut through);
+            let buffers = &mut ShadowBuffers::default();
+            light_visibility(input.rays, input.scene, sources, &rays, Coherence::Coherent, buffers, &mut through);
             let mut estimates = vec![Estimate::default(); counts.len()];
             let mut squares = vec![0.0; counts.len()];
             for ((k, value), seen) in values.into_iter().zip(through) {

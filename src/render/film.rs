@@ -151,6 +151,13 @@ pub struct Tile {
     pub dropped: u64,
 }
 
+impl Tile {
+    /// Column and row of its pixel number `i`.
+    pub fn pixel(&self, i: u32) -> [u32; 2] {
+        [self.origin[0] + i % self.size[0], self.origin[1] + i / self.size[0]]
+    }
+}
+
 /// An image in the making.
 #[derive(Clone, Debug)]
 pub struct Film {

@@ -17,16 +17,18 @@
 use std::f32::consts::FRAC_1_PI;
 use std::time::{Duration, Instant};
 
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 
 use super::film::{Feature, Tile};
 use super::nearness::Nearness;
 use super::path::{Arrival, Passes, Path, Shadow};
+use super::view::ViewRays;
+use crate::backend::edge::settle_edges;
 use crate::backend::{Coherence, Hit, Ray, RayScene, Visible};
 use crate::lighting::Lights;
-use crate::lighting::shadow::{ShadowRay, light_visibility};
+use crate::lighting::shadow::{ShadowBuffers, ShadowRay, light_visibility};
 use crate::radiosity::Solution;
-use crate::sampling::{hash_all, sobol};
+use crate::sampling::sobol;
 use crate::scene::{Camera, Scene};
 use crate::shading::{Bsdf, Lobes, SurfacePoint};
 use crate::simplify::{Simplified, SimplifiedGeometry, TriangleSource};
@@ -167,6 +169,7 @@ pub struct Workspace {
     far: Vec<u32>,
     shadows: Vec<Shadow>,
     shadow_rays: Vec<ShadowRay>,
+    shadow_buffers: ShadowBuffers,
     transmittance: Vec<Vec3>,
     hires: Vec<Vec3>,
     lores: Vec<Vec3>,
@@ -205,21 +208,10 @@ impl<'a> World<'a> {
         let pixels = tile.pixels.len();
         let trials = pixels * batch.trials as usize;
         ws.start(trials);
-        let size = Vec2::new(image_size[0] as f32, image_size[1] as f32);
-        let aspect = size.x / size.y;
-        for (i, _) in tile.pixels.iter().enumerate() {
-            let x = tile.origin[0] + i as u32 % tile.size[0];
-            let y = tile.origin[1] + i as u32 / tile.size[0];
-            for t in 0..batch.trials {
-                let number = batch.first + t;
-                // Even and odd trials come from two independent scramblings, so that their difference measures the error.
-                let stream = hash_all(&[y * image_size[0] + x, number & 1, batch.seed]);
-                let index = number >> 1;
-                let u = sobol(index, 0, stream);
-                let film = (Vec2::new(x as f32, y as f32) + Vec2::new(u[0], u[1])) / size;
-                let trial = i as u32 * batch.trials + t;
-                ws.paths.push(Path::view(camera.ray(film, aspect), trial, index, stream));
-            }
+        let view = ViewRays::new(camera, image_size, batch.seed);
+        for i in 0..pixels as u32 {
+            let trial = |t| view.path(tile.pixel(i), batch.first + t, i * batch.trials + t);
+            ws.paths.extend((0..batch.trials).map(trial));
         }
         ws.features.clear();
         if features {
@@ -311,6 +303,7 @@ impl<'a> World<'a> {
         }
         ws.hits.resize(ws.rays.len(), Hit::MISS);
         self.detailed.closest(&ws.rays, Visible::All, coherence, &mut ws.hits);
+        settle_edges(self.detailed, &mut ws.rays, &mut ws.hits);
         for k in 0..ws.traced.len() {
             let (index, hit) = (ws.traced[k], ws.hits[k]);
             if hit.is_hit() {
@@ -335,6 +328,7 @@ impl<'a> World<'a> {
         ws.rays.extend(ws.far.iter().map(|&i| ws.paths[i as usize].ray));
         ws.hits.resize(ws.rays.len(), Hit::MISS);
         far.rays.closest(&ws.rays, Visible::All, Coherence::Incoherent, &mut ws.hits);
+        settle_edges(far.rays, &mut ws.rays, &mut ws.hits);
         ws.counts.far += ws.rays.len() as u64;
         for k in 0..ws.far.len() {
             let (index, hit) = (ws.far[k], ws.hits[k]);
@@ -422,15 +416,16 @@ impl<'a> World<'a> {
         }
 
         let block = 1 + path.depth * BLOCKS_PER_EVENT;
-        let lights = sobol(path.index, block, path.stream);
         let facing = if front { point.shading_normal } else { -point.shading_normal };
         let wanted = if path.gathers { passes.lores } else { passes.hires };
-        if look_up.is_none() && wanted {
-            self.sample_lights(ws, &path, &point, facing, &bsdf, [lights[0], lights[1], lights[2]]);
+        if look_up.is_none() && wanted && !self.lights.is_empty() {
+            let u = sobol(path.index, block, path.stream);
+            self.sample_lights(ws, &path, &point, facing, &bsdf, [u[0], u[1], u[2]]);
         }
 
-        let u = sobol(path.index, block + 1, path.stream);
         let choose_high = choose_high(low, high);
+        let goes_on = look_up.is_none() && passes.lores && low != Vec3::ZERO;
+        let u = if choose_high > 0.0 || goes_on { sobol(path.index, block + 1, path.stream) } else { [0.0; 4] };
         if u[3] < choose_high {
             let Some(sample) = bsdf.sample_high([u[0], u[1], u[2]]) else { return };
             let arrival = match (sample.straight, sample.pdf) {
@@ -446,7 +441,7 @@ impl<'a> World<'a> {
                 depth: path.depth + 1,
                 ..path
             };
-            ws.next.extend(roulette(next, u[3] / choose_high));
+            ws.next.extend(roulette(next, u[3] / choose_high).map(|(path, _)| path));
             return;
         }
         let throughput = path.throughput / (1.0 - choose_high);
@@ -454,20 +449,23 @@ impl<'a> World<'a> {
             ws.lores[trial] += throughput * far.reflected(&Hit { triangle, ..*hit }, path.ray.direction);
             return;
         }
-        if !passes.lores || low == Vec3::ZERO {
+        if !goes_on {
             return;
         }
         let Some(sample) = bsdf.sample_low([u[0], u[1], u[2]]) else { return };
         let next = Path {
             ray: Ray::new(point.ray_origin(sample.direction), sample.direction),
             throughput: throughput * sample.weight,
-            near: self.far.map_or(f32::INFINITY, |far| far.r_thresh * (0.5 + lights[3])),
+            near: f32::INFINITY,
             arrival: Arrival::Soft,
             gathers: true,
             depth: path.depth + 1,
             ..path
         };
-        let Some(next) = roulette(next, (u[3] - choose_high) / (1.0 - choose_high)) else { return };
+        let Some((mut next, rest)) = roulette(next, (u[3] - choose_high) / (1.0 - choose_high)) else { return };
+        if let Some(far) = &self.far {
+            next.near = far.r_thresh * (0.5 + rest);
+        }
         match (path.gathers, capture) {
             (false, Some(captured)) => captured.push(next),
             _ => ws.next.push(next),
@@ -514,7 +512,8 @@ impl<'a> World<'a> {
     /// Traces all shadow rays of the round and adds what arrives.
     fn trace_shadows(&self, ws: &mut Workspace, coherence: Coherence) {
         ws.transmittance.resize(ws.shadow_rays.len(), Vec3::ZERO);
-        light_visibility(self.detailed, self.scene, None, &ws.shadow_rays, coherence, &mut ws.transmittance);
+        let (rays, buffers) = (&ws.shadow_rays, &mut ws.shadow_buffers);
+        light_visibility(self.detailed, self.scene, None, rays, coherence, buffers, &mut ws.transmittance);
         for (s, share) in ws.shadows.iter().zip(&ws.transmittance) {
             let sum = if s.gathers { &mut ws.lores } else { &mut ws.hires };
             sum[s.trial as usize] += s.radiance * *share;
@@ -564,10 +563,11 @@ impl Workspace {
 }
 
 /// Ends a path that brings little, or strengthens it by as much as others end; `u` in 0..1. Nothing is lost on average.
-fn roulette(path: Path, u: f32) -> Option<Path> {
+/// With the path comes what is left of `u`: again a number in 0..1.
+fn roulette(path: Path, u: f32) -> Option<(Path, f32)> {
     let most = if path.depth < CERTAIN_DEPTH { 1.0 } else { CERTAIN_SURVIVAL };
     let survival = if path.depth < ROULETTE_DEPTH { 1.0 } else { path.throughput.max_element().min(most) };
-    (u < survival).then_some(Path { throughput: path.throughput / survival, ..path })
+    (u < survival).then(|| (Path { throughput: path.throughput / survival, ..path }, u / survival))
 }
 
 /// Probability of going on along the highly directional part. Square roots keep weak but sharp reflections of light sources

@@ -8,6 +8,7 @@ pub mod nearness;
 pub mod path;
 pub mod plan;
 pub mod show;
+pub mod view;
 
 use std::time::{Duration, Instant};
 

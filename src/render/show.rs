@@ -1,13 +1,13 @@
 //! A radiosity solution shown directly: what the camera sees of patches, without any gather.
 
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 use rayon::prelude::*;
 
 use super::RenderParams;
 use super::film::Film;
 use super::integrator::{FarField, World};
+use super::view::ViewRays;
 use crate::backend::{Coherence, Hit, Ray, Visible};
-use crate::sampling::{hash_all, sobol};
 use crate::scene::Camera;
 use crate::shading::{Bsdf, Lobes, SurfacePoint};
 use crate::simplify::TriangleSource;
@@ -15,18 +15,12 @@ use crate::simplify::TriangleSource;
 /// Renders radiosity plus emission of the first surface of `far`, `min_trials` rays a pixel; everything goes to HIRES.
 pub fn show_radiosity(world: &World<'_>, far: &FarField<'_>, camera: &Camera, params: &RenderParams) -> Film {
     let mut film = Film::new(params.width, params.height);
-    let size = Vec2::new(params.width as f32, params.height as f32);
+    let view = ViewRays::new(camera, [params.width, params.height], params.seed);
     film.tiles.par_iter_mut().for_each(|tile| {
         let n = params.min_trials.max(1);
         let mut rays = Vec::with_capacity(tile.pixels.len() * n as usize);
         for i in 0..tile.pixels.len() as u32 {
-            let corner = [tile.origin[0] + i % tile.size[0], tile.origin[1] + i / tile.size[0]];
-            for t in 0..n {
-                let stream = hash_all(&[corner[1] * params.width + corner[0], t & 1, params.seed]);
-                let u = sobol(t >> 1, 0, stream);
-                let film = Vec2::new(corner[0] as f32 + u[0], corner[1] as f32 + u[1]) / size;
-                rays.push(camera.ray(film, size.x / size.y));
-            }
+            rays.extend((0..n).map(|t| view.path(tile.pixel(i), t, i * n + t).ray));
         }
         let mut hits = vec![Hit::MISS; rays.len()];
         far.rays.closest(&rays, Visible::All, Coherence::Coherent, &mut hits);

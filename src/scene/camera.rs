@@ -40,17 +40,44 @@ impl Camera {
     /// The ray through `film` (0..1 in both axes, from the top left) of an image with the given `aspect` ratio
     /// (width over height). Perspective keeps the vertical field of view whatever the aspect.
     pub fn ray(&self, film: Vec2, aspect: f32) -> Ray {
-        let (x, y) = (2.0 * film.x - 1.0, 1.0 - 2.0 * film.y);
-        match self.projection {
+        self.lens(aspect).ray(film)
+    }
+
+    /// The same for many rays.
+    pub fn lens(&self, aspect: f32) -> Lens {
+        let (x, y, central) = match self.projection {
             Projection::Perspective { y_fov } => {
                 let h = (0.5 * y_fov).tan();
-                let local = Vec3::new(x * h * aspect, y * h, -1.0);
-                Ray::new(self.position, (self.axes * local).normalize())
+                (h * aspect, h, true)
             }
-            Projection::Orthographic { x_mag, y_mag } => {
-                let offset = self.axes * Vec3::new(x * x_mag, y * y_mag, 0.0);
-                Ray::new(self.position + offset, -self.axes.z_axis)
-            }
+            Projection::Orthographic { x_mag, y_mag } => (x_mag, y_mag, false),
+        };
+        let [right, up, back] = [self.axes.x_axis, self.axes.y_axis, self.axes.z_axis];
+        Lens { position: self.position, forward: -back, right: x * right, up: y * up, central }
+    }
+}
+
+/// A camera made ready for images of one shape.
+#[derive(Clone, Copy, Debug)]
+pub struct Lens {
+    position: Vec3,
+    forward: Vec3,
+    /// From the centre of the film to its right edge.
+    right: Vec3,
+    /// From the centre of the film to its upper edge.
+    up: Vec3,
+    /// Whether rays leave one point.
+    central: bool,
+}
+
+impl Lens {
+    /// The ray through `film`, 0..1 in both axes, from the top left.
+    pub fn ray(&self, film: Vec2) -> Ray {
+        let offset = (2.0 * film.x - 1.0) * self.right + (1.0 - 2.0 * film.y) * self.up;
+        if self.central {
+            Ray::new(self.position, (self.forward + offset).normalize())
+        } else {
+            Ray::new(self.position + offset, self.forward)
         }
     }
 }

@@ -22,7 +22,7 @@ use glam::DVec3;
 pub use aabb::Aabb;
 pub use alpha::AlphaFilter;
 pub use builder::{GeometryId, MeshData, SceneBuilder};
-pub use camera::{Camera, Projection};
+pub use camera::{Camera, Lens, Projection};
 pub use gltf::{LoadOptions, load};
 pub use light::{LightKind, PunctualLight};
 pub use material::{Alpha, Material, TextureSlot};

@@ -154,9 +154,10 @@ fn locate(corners: [Vec3; 3], u: f32, v: f32) -> (Vec3, Vec3, Vec3) {
     if double_area == 0.0 {
         return (position, rounding.as_vec3(), Vec3::ZERO);
     }
-    let normal = cross / double_area;
+    let inverse = 1.0 / double_area;
+    let normal = cross * inverse;
     let extent = a.max(b).max(c) - a.min(b).min(c) + rounding;
-    let test_error = |w: DVec3| 6.0 * TEST_ROUNDINGS * ROUNDOFF * w.x * w.y * w.z / double_area;
+    let test_error = |w: DVec3| 6.0 * TEST_ROUNDINGS * ROUNDOFF * w.x * w.y * w.z * inverse;
     // The origin moves off the triangle by the bound itself, which lengthens the vectors a little.
     let moved = normal.abs().dot(rounding) + test_error(extent);
     // In a plane through the origin along the axes all of this is zero, and rays started in the plane would hit it at 0.
