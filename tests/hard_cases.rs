@@ -14,7 +14,8 @@ use gsii::backend::obvhs::ObvhsBackend;
 use gsii::backend::{Coherence, Hit, Part, PartKind, Ray, RayBackend, TriangleSet, Visible};
 use gsii::pipeline::{Method, Settings};
 use gsii::radiosity::{DirectLight, RadiosityParams};
-use gsii::render::bias;
+use gsii::progress::Progress;
+use gsii::render::{RenderParams, bias, render};
 use gsii::render::film::PixelSum;
 use gsii::sampling::{hash_all, uniform_sphere, unit};
 use gsii::scene::{Material, MeshData};
@@ -33,7 +34,22 @@ fn corner(points: &[[f64; 3]]) -> Vec<DVec3> {
     points.iter().map(|p| DVec3::from_array(*p)).collect()
 }
 
-/// Brightest and darkest value of an image and its mean, first band.
+/// Fixed sampling.
+fn fixed([width, height]: [u32; 2], trials: u32) -> RenderParams {
+    RenderParams {
+        width,
+        height,
+        min_trials: trials,
+        max_trials: trials,
+        hires_error: 1.0,
+        lores_error: 1.0,
+        time_limit: None,
+        features: false,
+        seed: 1,
+    }
+}
+
+/// Darkest and brightest value of an image and its mean, first band.
 fn range(film: &gsii::render::film::Film) -> [f64; 3] {
     let values: Vec<f64> = film.pixels().map(|p| Seen::All.of(p)[0]).collect();
     let mean = values.iter().sum::<f64>() / values.len() as f64;
@@ -411,21 +427,55 @@ fn numbers_beyond_f32_are_dropped_and_counted() {
     for method in [Method::Gsii, Method::Pmm, Method::Mcpt] {
         let settings = Settings { method, patch_size: Some(0.5), r_thresh: Some(0.3), ..Settings::default() };
         let prepared = prepare(&scene, settings).unwrap();
-        let params = gsii::render::RenderParams {
-            width: 16,
-            height: 16,
-            min_trials: 16,
-            max_trials: 16,
-            hires_error: 1.0,
-            lores_error: 1.0,
-            time_limit: None,
-            features: false,
-            seed: 1,
-        };
         let camera = look_at(&scene, v(0.5, 0.5, 0.0), DVec3::Z, 0.8, 0.5);
-        let film = gsii::render::render(&prepared.world(), &camera, &params, &gsii::progress::Progress::silent()).film;
+        let film = render(&prepared.world(), &camera, &fixed([16, 16], 16), &Progress::silent()).film;
         let dropped: u64 = film.tiles.iter().map(|t| t.dropped).sum();
         assert!(film.pixels().all(|p| Seen::All.of(p).iter().all(|x| x.is_finite())), "{method:?}");
         println!("{method:?}: {dropped} trials dropped");
     }
+}
+
+/// Traces at least `rays` rays in a dark room beside a lit one: view rays, paths of many reflections, and their shadow rays towards
+/// light on the other side of the wall. The wall is thin or has no thickness, the lamp touches it, or is a point.
+fn nothing_leaks(rays: u64) {
+    let variants = [(1e-4, true), (1e-4, false), (0.0, true), (0.0, false)];
+    for (thickness, ceiling) in variants {
+        let mut model = Model::new();
+        let x = 5.0 + thickness;
+        for (name, x0, x1) in [("lit", 0.0, 5.0), ("dark", x, 10.0)] {
+            for (i, face) in box_faces(v(x0, 0., 0.), v(x1, 5., 3.)).iter().enumerate() {
+                if thickness > 0.0 || (name, i) != ("dark", 0) {
+                    let e = if (name, i) == ("lit", 5) && ceiling { 1.0 } else { 0.0 };
+                    model.add(name, polygon(face), glow(0.9, e));
+                }
+            }
+        }
+        if !ceiling {
+            model.point_light(10.0, v(2.0, 2.0, 2.0));
+        }
+        let scene = model.finish();
+        let prepared = prepare(&scene, mcpt()).unwrap();
+        let camera = look_at(&scene, v(x, 2.5, 1.5), v(1.0, 0.1, 0.1), 4.0, 0.9);
+        let (mut traced, mut seed) = (0, 0);
+        while traced < rays.div_ceil(variants.len() as u64) {
+            let params = RenderParams { seed, ..fixed([64, 64], 32) };
+            let rendering = render(&prepared.world(), &camera, &params, &Progress::silent());
+            let counts = rendering.rays;
+            traced += counts.hires() + counts.lores();
+            assert_eq!(range(&rendering.film)[1], 0.0, "thickness {thickness}, ceiling {ceiling}, seed {seed}");
+            seed += 1;
+        }
+        println!("wall of {thickness}, {}: {traced} rays", if ceiling { "ceiling lamp" } else { "point light" });
+    }
+}
+
+#[test]
+fn a_million_rays_stay_in_their_room() {
+    nothing_leaks(1_000_000);
+}
+
+#[test]
+#[ignore = "takes minutes; its outcome is in docs/accuracy.md"]
+fn a_hundred_million_rays_stay_in_their_room() {
+    nothing_leaks(100_000_000);
 }
