@@ -2,6 +2,8 @@
 //!
 //! Every ray of a small rendering of the office is recorded, then replayed in the same batches through the backend with
 //! nothing around it. Printed is, for each pass, rays a second while rendering over rays a second of the replay. One thread.
+//!
+//! `cargo bench --bench passes -- Gsii HIRES` measures only what has one of these words in its name, of each kind.
 
 use std::error::Error;
 use std::hint::black_box;
@@ -14,7 +16,7 @@ use gsii::pipeline::{Method, Prepared, Settings, Stats, choose_camera};
 use gsii::progress::Progress;
 use gsii::render::integrator::{Batch, Workspace};
 use gsii::render::path::Passes;
-use gsii::render::{FarField, Film, World};
+use gsii::render::{BATCH_TRIALS, FarField, Film, World};
 use gsii::scene::Camera;
 use gsii::scene::gltf::{LoadOptions, load};
 
@@ -23,6 +25,9 @@ const RUNS: usize = 5;
 
 /// Pixels of the picture.
 const SIZE: [u32; 2] = [160, 90];
+
+/// Trials a pixel.
+const TRIALS: u32 = 64;
 
 struct Query {
     rays: Vec<Ray>,
@@ -87,12 +92,22 @@ fn main() -> Result<(), Box<dyn Error>> {
     rayon::ThreadPoolBuilder::new().num_threads(1).build_global()?;
     let scene = Arc::new(load(Path::new("scenes/office-high.glb"), &LoadOptions::default())?);
     let camera = choose_camera(&scene, None)?.clone();
+    let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with('-')).collect();
+    let wanted = |name: &str, all: [&str; 2]| {
+        words.iter().any(|w| w == name) || !words.iter().any(|w| all.contains(&w.as_str()))
+    };
     for method in [Method::Gsii, Method::Mcpt] {
+        if !wanted(&format!("{method:?}"), ["Gsii", "Mcpt"]) {
+            continue;
+        }
         let settings = Settings { method, ..Settings::default() };
         let prepared = Prepared::new(Arc::clone(&scene), &camera, settings, &Progress::silent(), &mut Stats::new())?;
         let world = prepared.world();
         println!("{method:?}, office-high, one thread:");
         for (name, passes) in [("HIRES", Passes::HIRES), ("LORES", Passes::LORES)] {
+            if !wanted(name, ["HIRES", "LORES"]) {
+                continue;
+            }
             let (ratio, rate) = measure(&world, &camera, passes);
             println!("  {name}: {rate:.2} million rays a second, {ratio:.2} of the bare replay");
         }
@@ -123,8 +138,10 @@ fn draw(world: &World<'_>, camera: &Camera, passes: Passes) -> (f64, u64) {
     let mut ws = Workspace::default();
     let start = Instant::now();
     for tile in &mut film.tiles {
-        let batch = Batch { first: 0, trials: 32, passes, seed: 0 };
-        world.render_tile(&mut ws, camera, SIZE, batch, false, tile);
+        for first in (0..TRIALS).step_by(BATCH_TRIALS as usize) {
+            let batch = Batch { first, trials: BATCH_TRIALS, passes, seed: 0 };
+            world.render_tile(&mut ws, camera, SIZE, batch, false, tile);
+        }
     }
     (start.elapsed().as_secs_f64(), ws.counts.hires() + ws.counts.lores())
 }

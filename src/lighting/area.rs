@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use glam::{DMat3, DVec3, Vec2, Vec3};
 
+use super::bilinear::Bilinear;
 use super::spherical::{Rectangle, Triangle, uniform_triangle};
 use crate::backend::Hit;
 use crate::scene::{Alpha, Material, Scene, TextureSlot};
@@ -16,6 +17,11 @@ const RECTANGLE_TOLERANCE: f64 = 1e-4;
 /// the limit of pbrt 4ed 6.5.4) the density per solid angle varies by less than a few percent over the light, and the
 /// choice by area is exact and cheap. Lights that are small only because they are seen edge-on stay with the solid angle.
 const FAR_SQUARED: f64 = 1e4;
+
+/// Squared ratio of distance to radius beyond which points of a rectangle are chosen with a bilinear density. At 1.5 radii
+/// that is off from the light that arrives by up to 20 %, at three by some percent; the uniform solid angle, which costs
+/// several times as much, leaves out the cosine at the receiver.
+const BILINEAR_SQUARED: f64 = 2.25;
 
 /// Smallest solid angle that is sampled as such; the f64 formulas are good to about 1e-15 sr.
 const MIN_SOLID_ANGLE: f64 = 1e-7;
@@ -76,10 +82,23 @@ pub(super) struct AreaPoint {
     pub uv: Vec2,
 }
 
+/// A point on a light source as seen from where it lights.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Seen {
+    pub point: AreaPoint,
+    /// Unit vector to the point. As good where the difference of the positions would be lost in rounding.
+    pub direction: Vec3,
+    pub distance: f32,
+    /// Per solid angle.
+    pub density: f64,
+}
+
 /// How points of a light source are chosen from one point of view.
 #[derive(Clone, Copy, Debug)]
 enum View {
     Area,
+    /// With the first corner as seen from the point of view, and the edges.
+    Bilinear(Bilinear, Vec3, [Vec3; 2]),
     /// In its frame: columns are its axes and the direction from the point of view to its plane.
     Rectangle(Rectangle, DMat3, f64),
     Triangle(Triangle, f64),
@@ -130,11 +149,22 @@ impl AreaLight {
         self.at(if self.is_rectangle() { u } else { uniform_triangle(u) })
     }
 
-    /// A point as seen from `position`, its offset from there, and its density per solid angle. `None` from the dark
-    /// side or from edge-on. The offset keeps its direction where the difference of the points would be lost in rounding.
-    pub(super) fn sample(&self, position: DVec3, u: [f32; 2]) -> Option<(AreaPoint, DVec3, f64)> {
-        let view = self.view(position)?;
-        Some(match view {
+    /// A point as seen from `position` on a surface with unit `normal` (zero: from all around). `None` from the dark side or
+    /// from edge-on.
+    pub(super) fn sample(&self, position: DVec3, normal: Vec3, u: [f32; 2]) -> Option<Seen> {
+        let (point, offset, density) = match self.view(position, normal)? {
+            View::Bilinear(density, corner, [e, f]) => {
+                let at = density.sample(u);
+                // From three radii away f32 is as good as the position is
+                let offset = corner + at[0] * e + at[1] * f;
+                let d2 = offset.length_squared();
+                let distance = d2.sqrt();
+                let direction = offset / distance;
+                let density = f64::from(density.at(at) * d2) / f64::from(direction.dot(self.cross.as_vec3()).abs());
+                let point = self.at(at.map(f64::from));
+                let usable = density.is_finite() && density > 0.0;
+                return usable.then_some(Seen { point, direction, distance, density });
+            }
             View::Area => {
                 let point = self.uniform_point(u);
                 let offset = point.position - position;
@@ -153,13 +183,20 @@ impl AreaLight {
                 let distance = distance.abs().min(triangle.farthest());
                 (self.at(weights), distance * direction, 1.0 / angle)
             }
-        })
+        };
+        let distance = offset.length();
+        Some(Seen { point, direction: (offset / distance).as_vec3(), distance: distance as f32, density })
     }
 
     /// Density per solid angle with which [`AreaLight::sample`] chooses the point at `offset` from `position`.
-    pub(super) fn density(&self, position: DVec3, offset: DVec3) -> f64 {
-        match self.view(position) {
+    pub(super) fn density(&self, position: DVec3, normal: Vec3, offset: DVec3) -> f64 {
+        match self.view(position, normal) {
             None => 0.0,
+            Some(View::Bilinear(density, ..)) => {
+                let from_corner = position + offset - self.corner;
+                let at = self.edges.map(|e| (from_corner.dot(e) / e.length_squared()).clamp(0.0, 1.0) as f32);
+                self.area_density(offset).unwrap_or(0.0) * f64::from(density.at(at))
+            }
             Some(View::Area) => self.area_density(offset).unwrap_or(0.0),
             Some(View::Rectangle(_, _, angle) | View::Triangle(_, angle)) => 1.0 / angle,
         }
@@ -174,15 +211,27 @@ impl AreaLight {
         (density.is_finite() && density > 0.0).then_some(density)
     }
 
-    fn view(&self, position: DVec3) -> Option<View> {
+    /// Whether it is sampled with a bilinear density from there, unless it is even farther.
+    pub(super) fn is_bilinear_from(&self, position: DVec3) -> bool {
+        self.is_rectangle() && (self.centre - position).length_squared() > BILINEAR_SQUARED * self.radius * self.radius
+    }
+
+    fn view(&self, position: DVec3, normal: Vec3) -> Option<View> {
         let corner = self.corner - position;
         // Positive on the counter-clockwise side
         let side = -corner.dot(self.cross);
         if side == 0.0 || (side < 0.0 && !self.both_faces) {
             return None;
         }
-        if (self.centre - position).length_squared() > FAR_SQUARED * self.radius * self.radius {
+        let (d2, r2) = ((self.centre - position).length_squared(), self.radius * self.radius);
+        if d2 > FAR_SQUARED * r2 {
             return Some(View::Area);
+        }
+        if self.is_bilinear_from(position) {
+            let [e, f] = self.edges.map(DVec3::as_vec3);
+            let corner = corner.as_vec3();
+            let density = Bilinear::new([corner, corner + e, corner + f, corner + e + f], side as f32, normal);
+            return Some(View::Bilinear(density, corner, [e, f]));
         }
         let (view, angle) = if let Some(RectangleFrame { x, y, normal, lengths, .. }) = self.rectangle {
             let (x0, y0) = (corner.dot(x), corner.dot(y));

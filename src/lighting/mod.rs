@@ -4,6 +4,7 @@
 //! decided by a tree over lights (`tree`) in proportion to what each may contribute.
 
 mod area;
+mod bilinear;
 mod bounds;
 mod emission;
 mod punctual;
@@ -19,7 +20,7 @@ use glam::Vec3;
 use crate::backend::Hit;
 use crate::sampling::{hash_all, unit};
 use crate::scene::{Aabb, LightKind, PunctualLight, Scene};
-use area::{AreaLight, AreaLights};
+use area::{AreaLight, AreaLights, Seen};
 use bounds::{Bounds, Cone, Emitter};
 use emission::FluxTable;
 pub use emission::{EmittedRay, EmittingTriangle};
@@ -111,19 +112,11 @@ impl Lights {
             });
         };
         let from = position.as_dvec3();
-        let (point, offset, density) = area.sample(from, [u[1], u[2]])?;
-        let distance = offset.length();
-        let direction = (offset / distance).as_vec3();
+        let Seen { point, direction, distance, density } = area.sample(from, normal, [u[1], u[2]])?;
         let pdf = density * probability;
-        let weight = (area.radiance_at(scene, &point).as_dvec3() / pdf).as_vec3();
+        let weight = area.radiance_at(scene, &point) * (1.0 / pdf) as f32;
         let usable = above(normal, direction) && weight.is_finite() && weight.max_element() > 0.0;
-        usable.then_some(LightSample {
-            direction,
-            distance: distance as f32,
-            weight,
-            pdf: Some(pdf as f32),
-            triangle: point.triangle,
-        })
+        usable.then_some(LightSample { direction, distance, weight, pdf: Some(pdf as f32), triangle: point.triangle })
     }
 
     /// Density per solid angle with which [`Lights::sample`] would have chosen `direction` towards `triangle`, which a ray
@@ -151,7 +144,7 @@ impl Lights {
             return 0.0;
         }
         let offset = direction.as_dvec3() * f64::from(distance);
-        (probability * self.areas.lights[light].density(position.as_dvec3(), offset)) as f32
+        (probability * self.areas.lights[light].density(position.as_dvec3(), normal, offset)) as f32
     }
 
     /// Probability of choosing from the tree rather than a directional light: half, where both can reach the point. Which of

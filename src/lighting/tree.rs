@@ -62,7 +62,9 @@ impl LightTree {
     pub(super) fn reaches(&self, position: Vec3, normal: Vec3) -> bool {
         match self.nodes.first() {
             None => false,
-            Some(root) => self.place.len() == 1 || sum(&root.emitters.importance(position, normal)) > 0.0,
+            Some(root) => {
+                self.place.len() == 1 || running_sums(&root.emitters.importance(position, normal))[LANES - 1] > 0.0
+            }
         }
     }
 
@@ -94,30 +96,26 @@ impl LightTree {
         let mut node = self.nodes.first()?;
         loop {
             let importance = node.emitters.importance(position, normal);
-            let total = sum(&importance);
+            let sums = running_sums(&importance);
+            let total = sums[LANES - 1];
             if total <= 0.0 {
                 return None;
             }
-            let mut rest = u * total;
-            // The last that is not zero, should rounding let the total run out
-            let mut chosen = None;
-            for (lane, &value) in importance.iter().enumerate() {
-                let value = f64::from(value);
-                if value > 0.0 {
-                    chosen = Some((lane, value, rest));
-                    if rest < value {
-                        break;
-                    }
-                    rest -= value;
-                }
-            }
-            let (lane, value, rest) = chosen?;
-            probability *= value / total;
-            u = (rest / value).min(1.0 - f64::EPSILON);
+            let target = u * f64::from(total);
+            // Counted without a branch. Lanes without importance end where the one before ends, and are never chosen; nor is
+            // what comes after the total, should the target be rounded to it
+            let rounded = target as f32;
+            let lane = sums.iter().map(|&sum| u32::from((sum <= rounded) & (sum < total))).sum::<u32>() as usize;
+            let value = f64::from(importance[lane]);
+            probability *= value / f64::from(total);
             match node.children[lane] {
                 Child::Nothing => return None,
                 Child::Light(light) => return Some((light, probability)),
-                Child::Node(number) => node = &self.nodes[number as usize],
+                Child::Node(number) => {
+                    node = &self.nodes[number as usize];
+                    let before = if lane == 0 { 0.0 } else { f64::from(sums[lane - 1]) };
+                    u = ((target - before) / value).clamp(0.0, 1.0 - f64::EPSILON);
+                }
             }
         }
     }
@@ -136,7 +134,7 @@ impl LightTree {
             if value <= 0.0 {
                 return 0.0;
             }
-            probability *= value / sum(&importance);
+            probability *= value / f64::from(running_sums(&importance)[LANES - 1]);
             if number == 0 {
                 return probability;
             }
@@ -145,8 +143,12 @@ impl LightTree {
     }
 }
 
-fn sum(importance: &[f32; LANES]) -> f64 {
-    importance.iter().map(|&v| f64::from(v)).sum()
+fn running_sums(importance: &[f32; LANES]) -> [f32; LANES] {
+    let mut sum = 0.0;
+    importance.map(|value| {
+        sum += value;
+        sum
+    })
 }
 
 fn bounds(leaves: &[Leaf], group: &[u32]) -> Bounds {

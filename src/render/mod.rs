@@ -26,7 +26,7 @@ use crate::sampling::hash_all;
 use crate::scene::Camera;
 
 /// Trials of one pixel that are traced as one batch; a tile of these fills the second-level cache.
-const BATCH_TRIALS: u32 = 32;
+pub const BATCH_TRIALS: u32 = 16;
 
 /// Keeps the pilot's random numbers apart from the image's.
 const PILOT: u32 = 0x7069_6c6f;

@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::{Aabb, ImportNotes, Mesh};
+use super::{ImportNotes, Mesh};
 
 /// Why a triangle is dropped.
 #[derive(Clone, Copy, PartialEq)]
@@ -33,11 +33,7 @@ pub(super) fn clean(mesh: &mut Mesh, emits: &[bool], notes: &mut ImportNotes) {
         compact(mesh, &flaws);
     }
     mesh.positions.par_iter_mut().filter(|p| !p.is_finite()).for_each(|p| *p = Vec3::ZERO);
-    mesh.bounds = mesh
-        .triangles
-        .par_iter()
-        .map(|t| Aabb::of(t.map(|i| mesh.positions[i as usize])))
-        .reduce(Aabb::default, Aabb::union);
+    mesh.measure();
 }
 
 fn flaw(mesh: &Mesh, triangle: [u32; 3]) -> Flaw {

@@ -143,6 +143,7 @@ fn assemble(builder: &SceneBuilder, centre: DVec3) -> Mesh {
         colors: vec![[1.0; 4]; sized(any(&|d| !d.colors.is_empty()))],
         triangles: vec![[0; 3]; triangles],
         object_of_triangle: vec![0; triangles],
+        planes: Vec::new(),
         objects: Vec::with_capacity(order.len()),
         bounds: Aabb::EMPTY,
     };

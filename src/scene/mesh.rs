@@ -4,7 +4,9 @@ use std::ops::Range;
 
 use glam::{Mat3, Vec2, Vec3};
 
-use super::Aabb;
+use rayon::prelude::*;
+
+use super::{Aabb, Plane};
 use crate::backend::{Part, PartKind};
 
 /// All triangles of a scene, in recentred world coordinates.
@@ -25,6 +27,8 @@ pub struct Mesh {
     pub triangles: Vec<[u32; 3]>,
     /// Index into [`Mesh::objects`], one a triangle.
     pub object_of_triangle: Vec<u32>,
+    /// Plane of each triangle.
+    pub planes: Vec<Plane>,
     /// The objects, in the order of their triangles.
     pub objects: Vec<Object>,
     /// Bounds of all triangles.
@@ -65,8 +69,15 @@ impl Mesh {
 
     /// Unit geometric normal of a triangle (counter-clockwise side).
     pub fn normal(&self, triangle: u32) -> Vec3 {
-        let [a, b, c] = self.corners(triangle).map(Vec3::as_dvec3);
-        (b - a).cross(c - a).normalize_or_zero().as_vec3()
+        self.planes[triangle as usize].normal
+    }
+
+    /// Brings bounds and planes up to date with the triangles.
+    pub fn measure(&mut self) {
+        let corners = |t: &[u32; 3]| t.map(|i| self.positions[i as usize]);
+        let planes = self.triangles.par_iter().map(|t| Plane::of(corners(t))).collect();
+        let bounds = self.triangles.par_iter().map(|t| Aabb::of(corners(t))).reduce(Aabb::default, Aabb::union);
+        (self.planes, self.bounds) = (planes, bounds);
     }
 
     /// Contiguous triangle ranges by kind, for a backend.

@@ -13,6 +13,7 @@ pub mod material;
 pub mod mesh;
 mod overview;
 mod pane;
+pub mod plane;
 #[cfg(test)]
 mod tests;
 pub mod texture;
@@ -27,6 +28,7 @@ pub use gltf::{LoadOptions, load};
 pub use light::{LightKind, PunctualLight};
 pub use material::{Alpha, Material, TextureSlot};
 pub use mesh::{Mesh, Object};
+pub use plane::Plane;
 pub use texture::{Texels, Texture, Wrap};
 
 /// A complete scene in recentred world coordinates (metres unless the file says otherwise, y up).

@@ -1,17 +1,10 @@
 //! Surface points with error bounds, and ray origins that stay on the right side.
 
-use glam::{DVec3, Mat3, Vec2, Vec3};
+use glam::{Mat3, Vec2, Vec3};
 
 use crate::backend::Hit;
-use crate::scene::{Material, Scene};
-
-/// Unit roundoff of f32, 2^-24.
-const ROUNDOFF: f64 = f32::EPSILON as f64 * 0.5;
-
-/// Roundings that one product in the determinant of a ray-triangle test goes through: translation of the vertices
-/// (1), two edges from them (3 each, as their error is absolute), two products, a difference and a dot product (5),
-/// rounded up for terms of second order.
-const TEST_ROUNDINGS: f64 = 16.0;
+use crate::scene::plane::position_rounding;
+use crate::scene::{Material, Plane, Scene};
 
 /// Cosine of the largest angle between geometric and shading normal, 89 degrees.
 const MIN_NORMAL_COSINE: f32 = 0.017_452_406;
@@ -43,7 +36,9 @@ impl SurfacePoint {
     pub fn new(scene: &Scene, hit: &Hit) -> Self {
         let mesh = &scene.mesh;
         let indices = mesh.triangles[hit.triangle as usize].map(|i| i as usize);
-        let (position, error, geometric_normal) = locate(mesh.corners(hit.triangle), hit.u, hit.v);
+        let plane = &mesh.planes[hit.triangle as usize];
+        let (position, error) = locate(mesh.corners(hit.triangle), plane, hit.u, hit.v);
+        let geometric_normal = plane.normal;
         let weights = [1.0 - hit.u - hit.v, hit.u, hit.v];
 
         let uv = [&mesh.uvs[0], &mesh.uvs[1]].map(|set| {
@@ -84,12 +79,13 @@ impl SurfacePoint {
     /// The point at `u`, `v` of a triangle with the given corners, which need not belong to a scene: flat, without texture
     /// coordinates. `triangle` is only stored.
     pub fn flat(corners: [Vec3; 3], triangle: u32, u: f32, v: f32) -> Self {
-        let (position, error, normal) = locate(corners, u, v);
+        let plane = Plane::of(corners);
+        let (position, error) = locate(corners, &plane, u, v);
         SurfacePoint {
             position,
             error,
-            geometric_normal: normal,
-            shading_normal: normal,
+            geometric_normal: plane.normal,
+            shading_normal: plane.normal,
             uv: [Vec2::ZERO; 2],
             triangle,
             u,
@@ -134,36 +130,14 @@ impl SurfacePoint {
     }
 }
 
-/// Rays start at least this far from their triangle, as a share of its size.
-const SMALLEST_OFFSET: f64 = 1e-12;
-
-/// Position, error bound and unit normal at barycentric weights `u` and `v` of the second and third corner.
+/// Position and error bound at barycentric weights `u` and `v` of the second and third corner.
 ///
-/// Evaluated in f64, so that the position's own error is its rounding to f32. The larger part of the bound is the
-/// error of a later f32 intersection test from there: the signed distance to the plane is a determinant of vectors
-/// no longer than the triangle's extent `w` along each axis, divided by the length of the normal; its six products
-/// are each off by at most [`TEST_ROUNDINGS`] roundings. That holds for Moeller-Trumbore as for Embree's robust
-/// (Pluecker) test, and is nothing for walls along the axes.
-fn locate(corners: [Vec3; 3], u: f32, v: f32) -> (Vec3, Vec3, Vec3) {
+/// Evaluated in f64, so that the position's own error is its rounding to f32.
+fn locate(corners: [Vec3; 3], plane: &Plane, u: f32, v: f32) -> (Vec3, Vec3) {
     let [a, b, c] = corners.map(Vec3::as_dvec3);
-    let (e1, e2) = (b - a, c - a);
-    let cross = e1.cross(e2);
-    let double_area = cross.length();
-    let position = (a + f64::from(u) * e1 + f64::from(v) * e2).as_vec3();
-    let rounding = ROUNDOFF * position.as_dvec3().abs() + 8.0 * f64::EPSILON * (a.abs() + b.abs() + c.abs());
-    if double_area == 0.0 {
-        return (position, rounding.as_vec3(), Vec3::ZERO);
-    }
-    let inverse = 1.0 / double_area;
-    let normal = cross * inverse;
-    let extent = a.max(b).max(c) - a.min(b).min(c) + rounding;
-    let test_error = |w: DVec3| 6.0 * TEST_ROUNDINGS * ROUNDOFF * w.x * w.y * w.z * inverse;
-    // The origin moves off the triangle by the bound itself, which lengthens the vectors a little.
-    let moved = normal.abs().dot(rounding) + test_error(extent);
-    // In a plane through the origin along the axes all of this is zero, and rays started in the plane would hit it at 0.
-    let least = SMALLEST_OFFSET * extent.max_element();
-    let distance = test_error(extent + 2.0 * moved * normal.abs()).max(least);
-    (position, (rounding + distance * normal.abs()).as_vec3(), normal.as_vec3())
+    let position = (a + f64::from(u) * (b - a) + f64::from(v) * (c - a)).as_vec3();
+    let rounding = position_rounding(position.as_dvec3().abs(), [a, b, c]).as_vec3();
+    (position, rounding + plane.clearance * plane.normal.abs())
 }
 
 /// Axes of a normal map on a triangle with these edges in space and in texture coordinates: x along u, y up in the

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use crate::backend::PartKind;
-use crate::scene::{Aabb, Material, Mesh, Object, Scene};
+use crate::scene::{Material, Mesh, Object, Scene};
 
 /// A scene of one opaque triangle.
 pub(super) fn scene_of(corners: [Vec3; 3], material: Material) -> Scene {
@@ -14,13 +14,13 @@ pub(super) fn scene_of(corners: [Vec3; 3], material: Material) -> Scene {
         axes: glam::Mat3::IDENTITY,
         kind: PartKind::Opaque,
     };
-    let mesh = Mesh {
+    let mut mesh = Mesh {
         positions: corners.to_vec(),
         triangles: vec![[0, 1, 2]],
         object_of_triangle: vec![0],
         objects: vec![object],
-        bounds: Aabb::of(corners),
         ..Mesh::default()
     };
+    mesh.measure();
     Scene { mesh, materials: vec![material], ..Scene::default() }
 }

@@ -7,7 +7,7 @@ use glam::{DVec3, Mat3, Vec3};
 use super::SimplifyParams;
 use crate::backend::{Coherence, Hit, HitFilter, Part, PartKind, Ray, RayBackend, RayScene, TriangleSet, Visible};
 use crate::error::Result;
-use crate::scene::{Aabb, Material, Mesh, Object, Scene};
+use crate::scene::{Aabb, Material, Object, Scene};
 
 /// Builds scenes triangle by triangle, one object for each call of [`SceneBuilder::object`].
 #[derive(Default)]
@@ -42,8 +42,7 @@ impl SceneBuilder {
     }
 
     pub(crate) fn build(mut self) -> Scene {
-        let Mesh { positions, bounds, .. } = &mut self.scene.mesh;
-        *bounds = Aabb::of(positions.iter().copied());
+        self.scene.mesh.measure();
         self.scene
     }
 }

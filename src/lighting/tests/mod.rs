@@ -11,7 +11,7 @@ use glam::{DVec3, Mat3, Vec3};
 use super::Lights;
 use crate::backend::PartKind;
 use crate::sampling::{hash_all, unit};
-use crate::scene::{Aabb, LightKind, Material, Mesh, Object, PunctualLight, Scene};
+use crate::scene::{LightKind, Material, Mesh, Object, PunctualLight, Scene};
 
 const SIGMAS: f64 = 5.0;
 
@@ -36,7 +36,7 @@ fn scene(polygons: &[(Vec<Vec3>, Material)], lights: &[(LightKind, Vec3)]) -> Sc
         });
         materials.push(material.clone());
     }
-    mesh.bounds = Aabb::of(mesh.positions.iter().copied());
+    mesh.measure();
     let lights =
         lights.iter().map(|&(kind, intensity)| PunctualLight { name: String::new(), intensity, kind }).collect();
     Scene { mesh, materials, lights, ..Scene::default() }

@@ -13,7 +13,7 @@ use glam::{DVec3, Mat3, Vec3};
 use super::*;
 use crate::backend::embree::EmbreeBackend;
 use crate::backend::{PartKind, RayBackend, RayScene};
-use crate::scene::{Aabb, Material, Mesh, Object, PunctualLight};
+use crate::scene::{Material, Mesh, Object, PunctualLight};
 use crate::simplify::TriangleSource;
 
 /// A scene with all that radiosity needs.
@@ -51,7 +51,7 @@ impl Room {
             });
             materials.push(material);
         }
-        mesh.bounds = Aabb::of(mesh.positions.iter().copied());
+        mesh.measure();
         geometry.positions = mesh.positions.clone();
         geometry.triangles = mesh.triangles.clone();
         geometry.sources =
