@@ -65,9 +65,10 @@ impl Load {
         }
     }
 
-    /// The ray and load for another try, when `hit` lies on an edge.
-    fn again(&self, ray: &Ray, hit: &Hit, depth: u32) -> Option<(Ray, Load)> {
-        if !edge::is_on_edge(hit) || self.retries == edge::RETRIES {
+    /// The ray and load for another try, when `hit` lies on an edge, or once when it is a miss that is `doubtful`.
+    fn again(&self, ray: &Ray, hit: &Hit, doubtful: bool, depth: u32) -> Option<(Ray, Load)> {
+        let lost = doubtful && self.retries == 0 && !hit.is_hit();
+        if !(lost || edge::is_on_edge(hit)) || self.retries == edge::RETRIES {
             return None;
         }
         let mut random = self.random(depth);
@@ -205,16 +206,17 @@ impl Tracer<'_> {
             self.input.rays.closest(&photons.rays, Visible::All, Coherence::Incoherent, hits);
             output.tally.rays += photons.rays.len() as u64;
             next.clear();
+            let doubtful = edge::misses_are_doubtful(hits);
             for ((ray, load), hit) in photons.rays.iter().zip(&photons.loads).zip(hits.iter()) {
                 let counts = deposit == Deposit::All || load.bent;
+                if let Some((ray, load)) = load.again(ray, hit, doubtful, depth as u32) {
+                    next.push(ray, load);
+                    continue;
+                }
                 if !hit.is_hit() {
                     if counts {
                         output.tally.escaped += load.flux;
                     }
-                    continue;
-                }
-                if let Some((ray, load)) = load.again(ray, hit, depth as u32) {
-                    next.push(ray, load);
                     continue;
                 }
                 let patch = self.patches.map.at(hit.triangle, hit.u, hit.v);
