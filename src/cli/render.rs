@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 use crate::image::{self, Metadata, ViewTransform, WriteOptions};
 use crate::pipeline::{Method, Prepared, Stats, choose_camera};
 use crate::render::layers::{Layer, develop};
-use crate::render::{self, PassTimes, RayCounts, RenderParams, Rendering, bias};
+use crate::render::{self, PassTimes, RayCounts, RenderParams, Rendering, World, bias};
 use crate::scene::Camera;
 
 /// Pairs of paths that measure the bias when not said otherwise.
@@ -58,6 +58,9 @@ pub struct Options {
     /// Fixed sampling: short for --min-trials N --max-trials N
     #[arg(long, value_name = "N", help_heading = "Quality", conflicts_with_all = ["min_trials", "max_trials", "error", "hires_error", "lores_error"])]
     spp: Option<u32>,
+    /// Gather indirect light for each pixel by itself, with no interpolation between places: slower, and without its error
+    #[arg(long, help_heading = "Quality")]
+    per_pixel: bool,
     /// Begin no new trials after this many seconds of rendering
     #[arg(long, value_name = "SECONDS", help_heading = "Quality")]
     time_limit: Option<f64>,
@@ -176,6 +179,7 @@ impl Options {
             lores_error,
             time_limit: self.time_limit.map(Duration::from_secs_f64),
             features: self.layers().iter().any(|l| l.is_feature()),
+            interpolate: !self.per_pixel,
             seed: self.method.seed,
         })
     }
@@ -193,7 +197,13 @@ impl Options {
             let film = render::show::show_radiosity(&world, &far, camera, params);
             let times = PassTimes { hires: start.elapsed(), lores: Duration::ZERO };
             let view = film.pixels().map(|p| u64::from(p.hires.trials())).sum();
-            return Rendering { film, rays: RayCounts { view, ..RayCounts::default() }, times, stopped: false };
+            return Rendering {
+                film,
+                rays: RayCounts { view, ..RayCounts::default() },
+                times,
+                stopped: false,
+                cache: None,
+            };
         }
         render::render(&world, camera, params, progress)
     }
@@ -212,7 +222,8 @@ impl Options {
         }
         let start = Instant::now();
         let aspect = params.width as f32 / params.height as f32;
-        let bias = bias::measure(&prepared.world(), camera, aspect, self.measure_bias, params.seed);
+        let world = World { cache: rendering.cache.as_ref(), ..prepared.world() };
+        let bias = bias::measure(&world, camera, aspect, self.measure_bias, params.seed);
         stats.record_bias(&bias, &rendering.film);
         stats.seconds.bias = start.elapsed().as_secs_f64();
     }

@@ -105,6 +105,7 @@ impl Prepared {
                 // Path tracing is the reference: nothing is blurred there.
                 least_roughness: if self.far.is_some() { self.settings.filter_glossy } else { 0.0 },
             },
+            cache: None,
             max_depth: self.settings.max_depth,
         }
     }

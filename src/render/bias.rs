@@ -56,11 +56,10 @@ pub fn measure(world: &World<'_>, camera: &Camera, aspect: f32, samples: u32, se
             let count = BATCH.min(samples - first);
             let stream = hash_all(&[seed, STREAM, batch]);
             let views: Vec<Path> = (0..count).map(|i| view_path(camera, aspect, i, stream)).collect();
-            let gathers = world.first_gathers(ws, &views);
-            let mut with_far = ws.take_lores();
-            for (sum, value) in with_far.iter_mut().zip(world.gather(ws, &gathers, count as usize)) {
-                *sum += *value;
-            }
+            let gathers: Vec<Path> = world.first_gathers(ws, &views).into_iter().map(|c| c.path).collect();
+            // With a cache only the point is shared
+            let start = if world.cache.is_some() { &views } else { &gathers };
+            let with_far = world.gather(ws, start, count as usize).to_vec();
             // Other random numbers than the first path's: only the first point and direction are shared.
             let detailed: Vec<Path> = gathers
                 .iter()

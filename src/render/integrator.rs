@@ -19,6 +19,7 @@ use std::time::{Duration, Instant};
 
 use glam::Vec3;
 
+use super::cache::IrradianceCache;
 use super::film::{Feature, Tile};
 use super::nearness::Nearness;
 use super::path::{Arrival, Passes, Path, Shadow};
@@ -49,6 +50,9 @@ const CERTAIN_SURVIVAL: f32 = 0.999;
 /// Random numbers of one path: one block of four for the camera, then two for each scattering event.
 const BLOCKS_PER_EVENT: u32 = 2;
 
+/// Share of paths that gather rough reflection apart from diffuse, per unit of its albedo.
+const PATHS_PER_ALBEDO: f32 = 4.0;
+
 /// Everything that does not change while an image is rendered.
 #[derive(Clone, Copy)]
 pub struct World<'a> {
@@ -65,8 +69,23 @@ pub struct World<'a> {
     /// Specular lobes at points that gather rays meet. View chains use the same threshold but see every surface as smooth
     /// as it is.
     pub gather_lobes: Lobes,
+    /// Indirect light of diffuse surfaces that the camera sees, where it is not gathered by each path.
+    pub cache: Option<&'a IrradianceCache>,
     /// Scattering events after which paths end.
     pub max_depth: u32,
+}
+
+/// A gather path that is about to start, and where.
+#[derive(Clone, Debug)]
+pub struct Captured {
+    /// The path.
+    pub path: Path,
+    /// Where it starts.
+    pub point: SurfacePoint,
+    /// Shading normal on the side that the camera sees.
+    pub normal: Vec3,
+    /// Whether any part of the surface is diffuse.
+    pub diffuse: bool,
 }
 
 /// Where radiance beyond `r_thresh` comes from.
@@ -92,6 +111,16 @@ impl FarField<'_> {
         let front = self.solution.is_front(hit.triangle, direction);
         self.solution.radiosity(hit.triangle, hit.u, hit.v, front) * FRAC_1_PI
     }
+}
+
+/// Which part of a weakly directional lobe a path has to gather.
+#[derive(Clone, Copy)]
+enum Rough {
+    Whole,
+    /// Only rough reflection, as the diffuse part came from the cache; by this share of all paths.
+    Only {
+        kept: f32,
+    },
 }
 
 /// Rays traced, by purpose.
@@ -175,6 +204,8 @@ pub struct Workspace {
     lores: Vec<Vec3>,
     /// What view rays meet first, one a trial; empty when nobody wants to know.
     features: Vec<Feature>,
+    /// How far each trial's first ray went; empty when nobody wants to know.
+    distances: Vec<f32>,
     /// Rays traced since this was last reset.
     pub counts: RayCounts,
     /// Time spent since this was last reset.
@@ -242,7 +273,7 @@ impl<'a> World<'a> {
 
     /// Follows view chains to their first weakly directional bounce and returns the gather paths that start there.
     /// Sums of the trials are left in the workspace.
-    pub(super) fn first_gathers(&self, ws: &mut Workspace, paths: &[Path]) -> Vec<Path> {
+    pub(super) fn first_gathers(&self, ws: &mut Workspace, paths: &[Path]) -> Vec<Captured> {
         ws.start(paths.len());
         ws.paths.extend_from_slice(paths);
         let mut captured = Vec::with_capacity(paths.len());
@@ -258,8 +289,22 @@ impl<'a> World<'a> {
         &ws.lores
     }
 
+    /// The same, with the distance of what each trial's first ray met.
+    pub(super) fn gather_with_distances<'w>(
+        &self,
+        ws: &'w mut Workspace,
+        paths: &[Path],
+        trials: usize,
+    ) -> (&'w [Vec3], &'w [f32]) {
+        ws.start(trials);
+        ws.distances.resize(trials, f32::INFINITY);
+        ws.paths.extend_from_slice(paths);
+        self.run(ws, Passes::LORES, None);
+        (&ws.lores, &ws.distances)
+    }
+
     /// Traces and shades until all paths have ended. With `capture`, paths end when they start to gather.
-    fn run(&self, ws: &mut Workspace, passes: Passes, mut capture: Option<&mut Vec<Path>>) {
+    fn run(&self, ws: &mut Workspace, passes: Passes, mut capture: Option<&mut Vec<Captured>>) {
         let mut coherence = Coherence::Coherent;
         while !ws.paths.is_empty() {
             let start = Instant::now();
@@ -282,7 +327,7 @@ impl<'a> World<'a> {
         ws: &mut Workspace,
         passes: Passes,
         coherence: Coherence,
-        capture: &mut Option<&mut Vec<Path>>,
+        capture: &mut Option<&mut Vec<Captured>>,
     ) {
         ws.traced.clear();
         ws.rays.clear();
@@ -307,6 +352,7 @@ impl<'a> World<'a> {
         for k in 0..ws.traced.len() {
             let (index, hit) = (ws.traced[k], ws.hits[k]);
             if hit.is_hit() {
+                ws.note_distance(index, hit.t);
                 ws.note_near(index);
                 self.shade(ws, index, &hit, None, passes, capture);
             } else if ws.paths[index as usize].near.is_finite() {
@@ -319,7 +365,7 @@ impl<'a> World<'a> {
     }
 
     /// Traces the far list in the simplified scene and looks radiosities up.
-    fn trace_far(&self, ws: &mut Workspace, passes: Passes, capture: &mut Option<&mut Vec<Path>>) {
+    fn trace_far(&self, ws: &mut Workspace, passes: Passes, capture: &mut Option<&mut Vec<Captured>>) {
         let Some(far) = self.far else { return };
         if ws.far.is_empty() {
             return;
@@ -346,9 +392,10 @@ impl<'a> World<'a> {
         index: u32,
         hit: &Hit,
         passes: Passes,
-        capture: &mut Option<&mut Vec<Path>>,
+        capture: &mut Option<&mut Vec<Captured>>,
     ) {
         let path = ws.paths[index as usize];
+        ws.note_distance(index, hit.t);
         // Within reach, and where the patch is large against the ray, the surface's own light is worked out.
         let near = hit.t <= path.near
             || (far.r_thresh > 0.0 && far.solution.patch_diameter(hit.triangle, hit.u, hit.v) > hit.t);
@@ -380,7 +427,7 @@ impl<'a> World<'a> {
         hit: &Hit,
         look_up: Option<u32>,
         passes: Passes,
-        capture: &mut Option<&mut Vec<Path>>,
+        capture: &mut Option<&mut Vec<Captured>>,
     ) {
         let path = ws.paths[index as usize];
         let trial = path.trial as usize;
@@ -423,6 +470,22 @@ impl<'a> World<'a> {
             self.sample_lights(ws, &path, &point, facing, &bsdf, [u[0], u[1], u[2]]);
         }
 
+        let mut rough = Rough::Whole;
+        let mut low = low;
+        if !path.gathers
+            && passes.lores
+            && capture.is_none()
+            && let Some(cache) = self.cache
+            && let diffuse = bsdf.albedo_diffuse()
+            && diffuse != Vec3::ZERO
+            && let Some(light) = cache.look_up(point.position, facing)
+        {
+            ws.lores[trial] += path.throughput * diffuse * light;
+            low = bsdf.albedo_rough();
+            // Little light is left: some paths gather it for all.
+            rough = Rough::Only { kept: (PATHS_PER_ALBEDO * low.max_element()).min(1.0) };
+        }
+
         let choose_high = choose_high(low, high);
         let goes_on = look_up.is_none() && passes.lores && low != Vec3::ZERO;
         let u = if choose_high > 0.0 || goes_on { sobol(path.index, block + 1, path.stream) } else { [0.0; 4] };
@@ -452,22 +515,32 @@ impl<'a> World<'a> {
         if !goes_on {
             return;
         }
-        let Some(sample) = bsdf.sample_low([u[0], u[1], u[2]]) else { return };
+        let mut rest = (u[3] - choose_high) / (1.0 - choose_high);
+        let (sample, share) = match rough {
+            Rough::Whole => (bsdf.sample_low([u[0], u[1], u[2]]), 1.0),
+            Rough::Only { kept } if rest >= kept => return,
+            Rough::Only { kept } => (bsdf.sample_rough([u[0], u[1]]), kept),
+        };
+        let Some(sample) = sample else { return };
+        rest /= share;
         let next = Path {
             ray: Ray::new(point.ray_origin(sample.direction), sample.direction),
-            throughput: throughput * sample.weight,
+            throughput: throughput * sample.weight / share,
             near: f32::INFINITY,
             arrival: Arrival::Soft,
             gathers: true,
             depth: path.depth + 1,
             ..path
         };
-        let Some((mut next, rest)) = roulette(next, (u[3] - choose_high) / (1.0 - choose_high)) else { return };
+        let Some((mut next, rest)) = roulette(next, rest) else { return };
         if let Some(far) = &self.far {
             next.near = far.r_thresh * (0.5 + rest);
         }
         match (path.gathers, capture) {
-            (false, Some(captured)) => captured.push(next),
+            (false, Some(captured)) => {
+                let diffuse = bsdf.albedo_diffuse() != Vec3::ZERO;
+                captured.push(Captured { path: next, point, normal: facing, diffuse });
+            }
             _ => ws.next.push(next),
         }
     }
@@ -527,9 +600,14 @@ impl<'a> World<'a> {
 }
 
 impl Workspace {
-    /// LORES sums of the last batch.
-    pub(super) fn take_lores(&mut self) -> Vec<Vec3> {
-        std::mem::take(&mut self.lores)
+    /// A ray met something at distance `t`.
+    fn note_distance(&mut self, path: u32, t: f32) {
+        let trial = self.paths[path as usize].trial;
+        if let Some(distance) = self.distances.get_mut(trial as usize)
+            && distance.is_infinite()
+        {
+            *distance = t;
+        }
     }
 
     /// A gather ray ended in the detailed scene.
@@ -555,6 +633,7 @@ impl Workspace {
     fn start(&mut self, trials: usize) {
         self.paths.clear();
         self.features.clear();
+        self.distances.clear();
         for sums in [&mut self.hires, &mut self.lores] {
             sums.clear();
             sums.resize(trials, Vec3::ZERO);

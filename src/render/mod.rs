@@ -1,6 +1,7 @@
 //! Both render passes: HIRES (what the eye sees sharply) and LORES (indirect light), in one wavefront.
 
 pub mod bias;
+pub mod cache;
 pub mod film;
 pub mod integrator;
 pub mod layers;
@@ -14,6 +15,7 @@ use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 
+pub use cache::IrradianceCache;
 pub use film::Film;
 use integrator::{Batch, Workspace};
 pub use integrator::{FarField, PassTimes, RayCounts, World};
@@ -50,6 +52,8 @@ pub struct RenderParams {
     pub time_limit: Option<Duration>,
     /// Whether to record albedo, normal and depth.
     pub features: bool,
+    /// Whether indirect light is interpolated between places (see [`cache`]), for GSII.
+    pub interpolate: bool,
     /// Seed: the same seed gives the same image, bit for bit, for any number of threads.
     pub seed: u32,
 }
@@ -65,6 +69,8 @@ pub struct Rendering {
     pub times: PassTimes,
     /// Whether it was stopped before all planned trials were done.
     pub stopped: bool,
+    /// What indirect light was interpolated from.
+    pub cache: Option<IrradianceCache>,
 }
 
 /// Renders an image.
@@ -75,6 +81,12 @@ pub fn render(world: &World<'_>, camera: &Camera, params: &RenderParams, progres
     let start = Instant::now();
     let deadline = params.time_limit.map(|limit| start + limit);
     let over = || progress.stopped() || deadline.is_some_and(|d| Instant::now() >= d);
+    let interpolate = params.interpolate && world.far.is_some_and(|far| far.r_thresh > 0.0 && far.r_thresh.is_finite());
+    let stage = progress.stage("irradiance cache", 0);
+    let cache = interpolate.then(|| IrradianceCache::new(world, camera, [params.width, params.height], params.seed));
+    stage.finish_and_clear();
+    let filled = start.elapsed();
+    let world = &World { cache: cache.as_ref(), ..*world };
     let mut renderer = Renderer { world, camera, params, rays: RayCounts::default(), times: PassTimes::default() };
 
     let mut film = Film::new(params.width, params.height);
@@ -100,7 +112,9 @@ pub fn render(world: &World<'_>, camera: &Camera, params: &RenderParams, progres
         done = next;
     }
     bar.finish_and_clear();
-    Rendering { film, rays: renderer.rays, times: renderer.times.scaled_to(start.elapsed()), stopped }
+    let mut times = renderer.times.scaled_to(start.elapsed() - filled);
+    times.lores += filled;
+    Rendering { film, rays: renderer.rays, times, stopped, cache }
 }
 
 struct Renderer<'a> {

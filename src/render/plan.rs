@@ -104,6 +104,7 @@ mod tests {
             lores_error: 0.1,
             time_limit: None,
             features: false,
+            interpolate: false,
             seed: 0,
         }
     }

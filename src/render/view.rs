@@ -1,6 +1,6 @@
 //! Where the trials of an image begin.
 
-use glam::Vec2;
+use glam::{Vec2, Vec3};
 
 use super::path::Path;
 use crate::sampling::{hash_all, sobol};
@@ -18,6 +18,11 @@ impl ViewRays {
     /// For an image of `size` pixels, width first.
     pub fn new(camera: &Camera, size: [u32; 2], seed: u32) -> Self {
         ViewRays { lens: camera.lens(size[0] as f32 / size[1] as f32), size, seed }
+    }
+
+    /// Width of a pixel at `position`, scene units.
+    pub fn footprint(&self, position: Vec3) -> f32 {
+        self.lens.footprint(position, self.size[1])
     }
 
     /// Trial `number` of a pixel (column, row); `trial` is the path's place in its batch.

@@ -71,6 +71,12 @@ pub struct Lens {
 }
 
 impl Lens {
+    /// Width of the `rows`th part of the film's height as seen at `position`, scene units.
+    pub fn footprint(&self, position: Vec3, rows: u32) -> f32 {
+        let height = 2.0 * self.up.length() / rows as f32;
+        if self.central { height * position.distance(self.position) } else { height }
+    }
+
     /// The ray through `film`, 0..1 in both axes, from the top left.
     pub fn ray(&self, film: Vec2) -> Ray {
         let offset = (2.0 * film.x - 1.0) * self.right + (1.0 - 2.0 * film.y) * self.up;

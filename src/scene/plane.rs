@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 /// Unit roundoff of f32, 2^-24.
-pub(crate) const ROUNDOFF: f64 = f32::EPSILON as f64 * 0.5;
+const ROUNDOFF: f64 = f32::EPSILON as f64 * 0.5;
 
 /// Roundings that one product in the determinant of a ray-triangle test goes through: translation of the vertices
 /// (1), two edges from them (3 each, as their error is absolute), two products, a difference and a dot product (5),
@@ -20,6 +20,8 @@ pub struct Plane {
     pub normal: Vec3,
     /// Distance from which a later intersection test in f32 cannot find the triangle again.
     pub clearance: f32,
+    /// Bound on the error along each axis of a point interpolated in f64, before it is rounded to f32.
+    pub interpolation: f32,
 }
 
 impl Plane {
@@ -33,11 +35,13 @@ impl Plane {
         let [a, b, c] = corners.map(Vec3::as_dvec3);
         let cross = (b - a).cross(c - a);
         let double_area = cross.length();
+        let interpolation = 8.0 * f64::EPSILON * (a.abs() + b.abs() + c.abs()).max_element();
+        let interpolation = (interpolation as f32).next_up();
         if double_area == 0.0 {
-            return Plane::default();
+            return Plane { interpolation, ..Plane::default() };
         }
         let normal = cross / double_area;
-        let rounding = position_rounding(a.abs().max(b.abs()).max(c.abs()), [a, b, c]);
+        let rounding = ROUNDOFF * a.abs().max(b.abs()).max(c.abs()) + f64::from(interpolation);
         let extent = a.max(b).max(c) - a.min(b).min(c) + rounding;
         let test_error = |w: DVec3| 6.0 * TEST_ROUNDINGS * ROUNDOFF * w.x * w.y * w.z / double_area;
         // The origin moves off the triangle by the bound itself, which lengthens the vectors a little.
@@ -45,11 +49,6 @@ impl Plane {
         // In a plane through the origin along the axes all of this is zero, and rays started in the plane would hit it at 0.
         let least = SMALLEST_OFFSET * extent.max_element();
         let clearance = test_error(extent + 2.0 * moved * normal.abs()).max(least);
-        Plane { normal: normal.as_vec3(), clearance: (clearance as f32).next_up() }
+        Plane { normal: normal.as_vec3(), clearance: (clearance as f32).next_up(), interpolation }
     }
-}
-
-/// Bound on the error of a point of a triangle, interpolated in f64 and rounded to f32; `position` is its absolute value.
-pub(crate) fn position_rounding(position: DVec3, [a, b, c]: [DVec3; 3]) -> DVec3 {
-    ROUNDOFF * position + 8.0 * f64::EPSILON * (a.abs() + b.abs() + c.abs())
 }

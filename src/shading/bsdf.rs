@@ -118,6 +118,16 @@ impl Bsdf {
         self.layered.as_ref().map_or(self.reflectance, Layered::albedo_low)
     }
 
+    /// The diffuse share of [`Bsdf::albedo_low`], as if it were Lambertian.
+    pub fn albedo_diffuse(&self) -> Vec3 {
+        self.layered.as_ref().map_or(self.reflectance, Layered::albedo_diffuse)
+    }
+
+    /// The rest of it: rough reflection.
+    pub fn albedo_rough(&self) -> Vec3 {
+        self.layered.as_ref().map_or(Vec3::ZERO, Layered::albedo_rough)
+    }
+
     /// The same of the highly directional part (reflection and transmission): the share of power that goes on,
     /// without the change of radiance by the index of refraction.
     pub fn albedo_high(&self) -> Vec3 {
@@ -165,6 +175,13 @@ impl Bsdf {
             transmitted: false,
             straight: false,
         })
+    }
+
+    /// Samples the rough reflection in `f_l cos`; `u` uniform in 0..1.
+    pub fn sample_rough(&self, u: [f32; 2]) -> Option<BsdfSample> {
+        let (direction, weight, pdf) = self.layered.as_ref()?.sample_rough(u)?;
+        let above = self.geometric_normal.dot(direction) > 0.0;
+        above.then_some(BsdfSample { direction, weight, pdf: Some(pdf), transmitted: false, straight: false })
     }
 
     /// Samples `f_h cos`; `u` uniform in 0..1.

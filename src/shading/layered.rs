@@ -155,8 +155,29 @@ impl Layered {
 
     /// Albedo of diffuse, multiple scattering and, when rough, specular reflection.
     pub fn albedo_low(&self) -> Vec3 {
-        let specular = if self.specular_is_high { Vec3::ZERO } else { self.specular_albedo };
-        self.diffuse_albedo + self.multiple_albedo + specular
+        self.albedo_diffuse() + self.albedo_rough()
+    }
+
+    /// Albedo of diffuse and multiple scattering.
+    pub fn albedo_diffuse(&self) -> Vec3 {
+        self.diffuse_albedo + self.multiple_albedo
+    }
+
+    /// Albedo of rough specular reflection.
+    pub fn albedo_rough(&self) -> Vec3 {
+        if self.specular_is_high { Vec3::ZERO } else { self.specular_albedo }
+    }
+
+    /// A direction (world) from the rough specular lobe alone, its `f cos / pdf` and `pdf`.
+    pub fn sample_rough(&self, u: [f32; 2]) -> Option<(Vec3, Vec3, f32)> {
+        let h = ggx::sample_visible(self.outgoing, self.alpha, u);
+        let incoming = 2.0 * self.outgoing.dot(h) * h - self.outgoing;
+        if incoming.z <= 0.0 {
+            return None;
+        }
+        let lobe = Reflection::new(self.outgoing, incoming, self.alpha);
+        let weight = self.schlick(lobe.along) * (lobe.value / lobe.pdf);
+        (lobe.pdf > 0.0).then(|| (self.frame * incoming, weight, lobe.pdf))
     }
 
     /// Albedo of glass and, when not rough, specular reflection.

@@ -3,8 +3,10 @@
 use glam::{Mat3, Vec2, Vec3};
 
 use crate::backend::Hit;
-use crate::scene::plane::position_rounding;
-use crate::scene::{Material, Plane, Scene};
+use crate::scene::{Plane, Scene, TextureSlot};
+
+/// Unit roundoff of f32, 2^-24, with room for the rounding of the bound itself.
+const ROUNDOFF: f32 = f32::EPSILON * 0.500_001;
 
 /// Cosine of the largest angle between geometric and shading normal, 89 degrees.
 const MIN_NORMAL_COSINE: f32 = 0.017_452_406;
@@ -58,22 +60,22 @@ impl SurfacePoint {
                 }
             }
         }
-        let mut point = SurfacePoint {
+        let material = &scene.materials[mesh.object(hit.triangle).material as usize];
+        if let Some(slot) = &material.normal_texture {
+            let bent = mapped_normal(scene, hit.triangle, &uv, slot, material.normal_scale, shading_normal);
+            // What is bent below the surface stays unbent
+            shading_normal = bent.filter(|n| n.dot(geometric_normal) > 0.0).unwrap_or(shading_normal);
+        }
+        SurfacePoint {
             position,
             error,
             geometric_normal,
-            shading_normal,
+            shading_normal: within_limit(shading_normal, geometric_normal),
             uv,
             triangle: hit.triangle,
             u: hit.u,
             v: hit.v,
-        };
-        let material = &scene.materials[mesh.object(hit.triangle).material as usize];
-        if material.normal_texture.is_some() {
-            point.shading_normal = point.mapped_normal(scene, material).unwrap_or(shading_normal);
         }
-        point.shading_normal = within_limit(point.shading_normal, geometric_normal);
-        point
     }
 
     /// The point at `u`, `v` of a triangle with the given corners, which need not belong to a scene: flat, without texture
@@ -111,23 +113,27 @@ impl SurfacePoint {
         let origin = self.position + offset;
         Vec3::new(away(origin.x, offset.x), away(origin.y, offset.y), away(origin.z, offset.z))
     }
+}
 
-    /// The shading normal as the normal map bends it; `None` where texture coordinates span no area.
-    fn mapped_normal(&self, scene: &Scene, material: &Material) -> Option<Vec3> {
-        let slot = material.normal_texture.as_ref()?;
-        let set = usize::from(slot.uv_set);
-        let coordinates = scene.mesh.uvs.get(set).filter(|uvs| !uvs.is_empty())?;
-        let [a, b, c] = scene.mesh.triangles[self.triangle as usize].map(|i| coordinates[i as usize]);
-        let [duv1, duv2] = [b - a, c - a].map(|d| slot.transform.transform_vector2(d));
-        let [a, b, c] = scene.mesh.corners(self.triangle);
-        let frame = texture_frame(self.shading_normal, [b - a, c - a], [duv1, duv2])?;
+/// `normal` as the normal map bends it at texture coordinates `uv`; `None` where texture coordinates span no area.
+fn mapped_normal(
+    scene: &Scene,
+    triangle: u32,
+    uv: &[Vec2; 2],
+    slot: &TextureSlot,
+    scale: f32,
+    normal: Vec3,
+) -> Option<Vec3> {
+    let set = usize::from(slot.uv_set);
+    let coordinates = scene.mesh.uvs.get(set).filter(|uvs| !uvs.is_empty())?;
+    let [a, b, c] = scene.mesh.triangles[triangle as usize].map(|i| coordinates[i as usize]);
+    let [duv1, duv2] = [b - a, c - a].map(|d| slot.transform.transform_vector2(d));
+    let [a, b, c] = scene.mesh.corners(triangle);
+    let frame = texture_frame(normal, [b - a, c - a], [duv1, duv2])?;
 
-        let uv = slot.transform.transform_point2(self.uv[set]);
-        let map = 2.0 * scene.textures[slot.texture as usize].sample(uv).truncate() - Vec3::ONE;
-        let scale = material.normal_scale;
-        let bent = (frame * Vec3::new(map.x * scale, map.y * scale, map.z)).try_normalize()?;
-        (bent.dot(self.geometric_normal) > 0.0).then_some(bent)
-    }
+    let uv = slot.transform.transform_point2(uv[set]);
+    let map = 2.0 * scene.textures[slot.texture as usize].sample(uv).truncate() - Vec3::ONE;
+    (frame * Vec3::new(map.x * scale, map.y * scale, map.z)).try_normalize()
 }
 
 /// Position and error bound at barycentric weights `u` and `v` of the second and third corner.
@@ -136,7 +142,7 @@ impl SurfacePoint {
 fn locate(corners: [Vec3; 3], plane: &Plane, u: f32, v: f32) -> (Vec3, Vec3) {
     let [a, b, c] = corners.map(Vec3::as_dvec3);
     let position = (a + f64::from(u) * (b - a) + f64::from(v) * (c - a)).as_vec3();
-    let rounding = position_rounding(position.as_dvec3().abs(), [a, b, c]).as_vec3();
+    let rounding = ROUNDOFF * position.abs() + plane.interpolation;
     (position, rounding + plane.clearance * plane.normal.abs())
 }
 
@@ -167,6 +173,7 @@ fn within_limit(normal: Vec3, geometric: Vec3) -> Vec3 {
 mod tests {
     use super::*;
     use crate::sampling::{hash_all, uniform_sphere, unit};
+    use crate::scene::Material;
     use crate::shading::testing::scene_of;
 
     /// Moeller and Trumbore 1997, in f32, both faces; the ray parameter where `0 <= t`.

@@ -120,6 +120,7 @@ pub fn fixed(width: u32, height: u32, trials: u32, seed: u32) -> RenderParams {
         height,
         min_trials: trials,
         max_trials: trials,
+        interpolate: false,
         hires_error: 0.05,
         lores_error: 0.05,
         time_limit: None,

@@ -1,0 +1,175 @@
+//! An irradiance cache: indirect light of diffuse surfaces is gathered at few places and interpolated in between.
+//!
+//! Light from beyond `r_thresh` varies slowly over distances small against `r_thresh`: that is what simplification makes of it.
+//! Records are placed where the image needs them, on ever finer grids of pixels, until every place is within reach of one
+//! (Ward, Rubinstein and Clear 1988). How far a record reaches follows from the distances of what it sees, so that records are
+//! close together next to other surfaces. Where none reaches, paths gather as without a cache.
+
+mod index;
+mod record;
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::integrator::{Captured, FarField, Workspace, World};
+use super::path::{Arrival, Path};
+use super::view::ViewRays;
+use crate::backend::Ray;
+use crate::sampling::{hash_all, sobol};
+use crate::scene::Camera;
+use index::Index;
+use record::{RAYS, Record};
+
+/// Distances in pixels of the places that are looked at, pass after pass.
+const SPACINGS: [u32; 4] = [16, 8, 4, 2];
+
+/// A place that has less weight of records than this gets one of its own.
+const COVERED: f32 = 0.4;
+
+/// Reach of a record as a share of its harmonic mean distance.
+const ACCURACY: f32 = 0.25;
+
+/// Least reach in pixels.
+const LEAST_PIXELS: f32 = 1.5;
+
+/// Keeps the cache's random numbers apart from the image's.
+const STREAM: u32 = 0x6361_6368;
+
+/// Records of indirect light.
+#[derive(Clone, Debug, Default)]
+pub struct IrradianceCache {
+    records: Vec<Record>,
+    index: Index,
+}
+
+impl IrradianceCache {
+    /// Fills a cache for one view. The same on any number of threads.
+    pub fn new(world: &World<'_>, camera: &Camera, size: [u32; 2], seed: u32) -> Self {
+        let Some(far) = &world.far else { return IrradianceCache::default() };
+        let view = ViewRays::new(camera, size, hash_all(&[seed, STREAM]));
+        let mut cache = IrradianceCache::default();
+        for (pass, spacing) in SPACINGS.into_iter().enumerate() {
+            let places = cache.places(world, &view, size, spacing, pass as u32);
+            let fresh: Vec<Option<Record>> = places
+                .par_iter()
+                .enumerate()
+                .map_init(Workspace::default, |ws, (number, place)| {
+                    gather(world, far, ws, place, hash_all(&[seed, STREAM, pass as u32, number as u32]))
+                })
+                .collect();
+            cache.records.extend(fresh.into_iter().flatten());
+            cache.settle(far.r_thresh);
+        }
+        cache
+    }
+
+    /// Diffuse places at the pixels of a grid that the records so far do not cover.
+    fn places(&self, world: &World<'_>, view: &ViewRays, size: [u32; 2], spacing: u32, pass: u32) -> Vec<Place> {
+        let [columns, rows] = size.map(|s| s.div_ceil(spacing));
+        let row = |y: u32| -> Vec<Path> {
+            let pixel = |x: u32| [x, y].map(|i| i * spacing + spacing / 2);
+            let inside = (0..columns).map(pixel).filter(|p| p[0] < size[0] && p[1] < size[1]);
+            inside.enumerate().map(|(i, p)| view.path(p, 2 * pass, i as u32)).collect()
+        };
+        let found = (0..rows).into_par_iter().map_init(Workspace::default, |ws, y| {
+            let reached = world
+                .first_gathers(ws, &row(y))
+                .into_iter()
+                .map(|captured| Place { footprint: view.footprint(captured.point.position), captured });
+            let covered = |p: &Place| {
+                let (position, normal) = (p.captured.point.position, p.captured.normal);
+                self.around(position, normal).map(|(weight, _)| weight).sum::<f32>() >= COVERED
+            };
+            reached.filter(|p| p.captured.diffuse && !covered(p)).collect::<Vec<_>>()
+        });
+        found.collect::<Vec<_>>().concat()
+    }
+
+    /// Works out how far each record reaches: no farther than a neighbour's distance and the way there allow (Krivanek et al.
+    /// 2006, neighbour clamping).
+    fn settle(&mut self, r_thresh: f32) {
+        // Sorted along one axis, neighbours are close together.
+        let mut order: Vec<usize> = (0..self.records.len()).collect();
+        order.sort_by(|&a, &b| self.records[a].position.x.total_cmp(&self.records[b].position.x));
+        let all = &self.records;
+        let limit = r_thresh / ACCURACY;
+        let clamped: Vec<f32> = (0..order.len())
+            .into_par_iter()
+            .map(|place| {
+                let own = &all[order[place]];
+                let mut distance = own.distance.min(own.scale_of_change()).min(limit);
+                let near = |&&other: &&usize| (all[other].position.x - own.position.x).abs() < distance;
+                let (before, after) = (order[..place].iter().rev(), order[place + 1..].iter());
+                let mut least = distance;
+                for &other in before.take_while(near).chain(after.take_while(near)) {
+                    let other = &all[other];
+                    least = least.min(other.distance + other.position.distance(own.position));
+                }
+                distance = least;
+                distance
+            })
+            .collect();
+        for (place, distance) in clamped.into_iter().enumerate() {
+            let record = &mut self.records[order[place]];
+            record.reach = (ACCURACY * distance).max(record.least_reach);
+        }
+        self.index = Index::new(&self.records);
+    }
+
+    /// The records that reach a point, with their weights.
+    fn around(&self, position: Vec3, normal: Vec3) -> impl Iterator<Item = (f32, &Record)> {
+        let weighted = move |number: usize| {
+            let record = &self.records[number];
+            (record.weight(position, normal), record)
+        };
+        self.index.around(position).map(weighted).filter(|(weight, _)| *weight > 0.0)
+    }
+
+    /// Number of records.
+    pub fn len(&self) -> usize {
+        self.records.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.records.is_empty()
+    }
+
+    /// Irradiance over pi at a point with shading normal `normal`; `None` where no record reaches.
+    pub fn look_up(&self, position: Vec3, normal: Vec3) -> Option<Vec3> {
+        let (mut sum, mut weights) = (Vec3::ZERO, 0.0);
+        for (weight, record) in self.around(position, normal) {
+            sum += weight * record.at(position, normal);
+            weights += weight;
+        }
+        (weights > 0.0).then(|| sum / weights)
+    }
+}
+
+/// A place that may get a record.
+#[derive(Clone)]
+struct Place {
+    captured: Captured,
+    /// Width of a pixel there, scene units.
+    footprint: f32,
+}
+
+/// Gathers the light of one place.
+fn gather(world: &World<'_>, far: &FarField<'_>, ws: &mut Workspace, place: &Place, stream: u32) -> Option<Record> {
+    let Captured { point, normal, .. } = &place.captured;
+    let paths: Vec<Path> = (0..RAYS)
+        .map(|k| {
+            let direction = record::direction(*normal, k, stream);
+            let [.., u, _] = sobol(k as u32, 0, stream);
+            Path {
+                near: far.r_thresh * (0.5 + u),
+                arrival: Arrival::Soft,
+                gathers: true,
+                depth: 1,
+                ..Path::view(Ray::new(point.ray_origin(direction), direction), k as u32, k as u32, stream)
+            }
+        })
+        .collect();
+    let (radiance, distances) = world.gather_with_distances(ws, &paths, RAYS);
+    Record::new(point.position, *normal, LEAST_PIXELS * place.footprint, radiance, distances)
+}

@@ -1,0 +1,186 @@
+//! What one place tells about the indirect light around it.
+
+use std::f32::consts::{FRAC_1_PI, TAU};
+
+use glam::{Mat3, Vec3};
+
+use crate::sampling::{basis, sobol};
+
+/// Strata of the hemisphere: rings of equal projected solid angle, and sectors.
+pub(super) const RINGS: usize = 16;
+/// See [`RINGS`].
+pub(super) const SECTORS: usize = 48;
+/// Gather rays of one record.
+pub(super) const RAYS: usize = RINGS * SECTORS;
+
+/// Largest angle between normals over which a record is used: 20 degrees, as the cosine.
+const LEAST_COSINE: f32 = 0.939_692_6;
+
+/// A point may lie this far in front of a record's tangent plane, as a share of the record's reach, before the record is taken to
+/// see what the point does not (Ward 1988, section 2.2).
+const IN_FRONT: f32 = 0.1;
+
+/// Indirect light at one point of a surface, and how it changes around it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Record {
+    pub position: Vec3,
+    /// Unit shading normal on the lit side.
+    pub normal: Vec3,
+    /// Harmonic mean distance of what the hemisphere sees, bounded by neighbours and gradients; scene units.
+    pub distance: f32,
+    /// Distance over which the record is used, scene units.
+    pub reach: f32,
+    /// What [`Record::reach`] may not fall below.
+    pub least_reach: f32,
+    /// Irradiance over pi: the radiance that a white diffuse surface reflects, W/(sr m^2).
+    pub radiance: Vec3,
+    /// Change of each band with the normal: scalar product with the axis of rotation times its sine.
+    by_rotation: [Vec3; 3],
+    /// Change of each band with the position.
+    by_translation: [Vec3; 3],
+}
+
+/// The direction of ray `k` (ring by ring) of the record of `stream` around `normal`, cosine-distributed in its stratum.
+pub(super) fn direction(normal: Vec3, k: usize, stream: u32) -> Vec3 {
+    let u = sobol(k as u32, 0, stream);
+    let (ring, sector) = (k / SECTORS, k % SECTORS);
+    let sin2 = (ring as f32 + u[0]) / RINGS as f32;
+    let phi = TAU * (sector as f32 + u[1]) / SECTORS as f32;
+    let (sin, cos) = phi.sin_cos();
+    let radius = sin2.sqrt();
+    basis(normal) * Vec3::new(radius * cos, radius * sin, (1.0 - sin2).max(0.0).sqrt())
+}
+
+impl Record {
+    /// From the radiance that each ray of [`direction`] brings, and the distance of what it meets (infinite where nothing).
+    /// `None` when something is not finite.
+    ///
+    /// Gradients after Ward and Heckbert, "Irradiance gradients" (1992), for strata of equal projected solid angle.
+    pub fn new(position: Vec3, normal: Vec3, least_reach: f32, radiance: &[Vec3], distances: &[f32]) -> Option<Self> {
+        let sum: Vec3 = radiance.iter().sum();
+        let inverse: f64 = distances.iter().map(|&d| 1.0 / f64::from(d.max(f32::MIN_POSITIVE))).sum();
+        let mean = sum / RAYS as f32;
+        let distance = (RAYS as f64 / inverse) as f32;
+        let at = |ring: usize, sector: usize| ring * SECTORS + sector % SECTORS;
+        let closest = |a: usize, b: usize| distances[a].min(distances[b]);
+        let boundary = |ring: usize| (ring as f32 / RINGS as f32).sqrt();
+        // Columns: change of one band along the frame's axes
+        let (mut rotation, mut translation) = (Mat3::ZERO, Mat3::ZERO);
+        let outer = |axis: Vec3, value: Vec3| Mat3::from_cols(axis * value.x, axis * value.y, axis * value.z);
+        for sector in 0..SECTORS {
+            let angle = |s: f32| TAU * s / SECTORS as f32;
+            let (sin, cos) = angle(sector as f32 + 0.5).sin_cos();
+            let (outward, around) = (Vec3::new(cos, sin, 0.0), Vec3::new(-sin, cos, 0.0));
+            let (sin, cos) = angle(sector as f32).sin_cos();
+            let around_before = Vec3::new(-sin, cos, 0.0);
+            let before = sector + SECTORS - 1;
+            for ring in 0..RINGS {
+                let here = radiance[at(ring, sector)];
+                let sin2 = (ring as f32 + 0.5) / RINGS as f32;
+                let (sin, cos) = (sin2.sqrt(), (1.0 - sin2).sqrt());
+                rotation -= outer(around, here * (sin / cos));
+                if ring > 0 {
+                    let s = boundary(ring);
+                    let d = closest(at(ring, sector), at(ring - 1, sector));
+                    let weight = TAU / SECTORS as f32 * s * (1.0 - s * s) / d;
+                    translation += outer(outward, (here - radiance[at(ring - 1, sector)]) * weight);
+                }
+                let cosine = |ring: usize| (1.0 - boundary(ring) * boundary(ring)).max(0.0).sqrt();
+                let d = closest(at(ring, sector), at(ring, before));
+                let weight = cos * (cosine(ring) - cosine(ring + 1)) / (sin * d);
+                translation += outer(around_before, (here - radiance[at(ring, before)]) * weight);
+            }
+        }
+        let frame = basis(normal);
+        let columns = |m: Mat3, scale: f32| [m.x_axis, m.y_axis, m.z_axis].map(|g| frame * g * scale);
+        let by_rotation = columns(rotation, 1.0 / RAYS as f32);
+        let by_translation = columns(translation, FRAC_1_PI);
+        let finite =
+            mean.is_finite() && by_rotation.iter().chain(&by_translation).all(|g| g.is_finite()) && distance > 0.0;
+        finite.then_some(Record {
+            position,
+            normal,
+            distance,
+            reach: least_reach,
+            least_reach,
+            radiance: mean,
+            by_rotation,
+            by_translation,
+        })
+    }
+
+    /// Distance over which the light would vanish or double if it went on changing as fast as here.
+    pub fn scale_of_change(&self) -> f32 {
+        let change: f32 = self.by_translation.iter().map(|g| g.length()).sum();
+        if change > 0.0 { self.radiance.element_sum() / change } else { f32::INFINITY }
+    }
+
+    /// Weight of the record at a point: one at its own, falling linearly to zero at the end of its reach (Tabellion and
+    /// Lamorlette 2004).
+    pub fn weight(&self, position: Vec3, normal: Vec3) -> f32 {
+        let offset = position - self.position;
+        let near = offset.length() / self.reach;
+        let turned = ((1.0 - normal.dot(self.normal)).max(0.0) / (1.0 - LEAST_COSINE)).sqrt();
+        let weight = 1.0 - near.max(turned);
+        if weight <= 0.0 || offset.dot(normal + self.normal) < -2.0 * IN_FRONT * self.reach {
+            return 0.0;
+        }
+        weight
+    }
+
+    /// Irradiance over pi at a nearby point, by the gradients.
+    pub fn at(&self, position: Vec3, normal: Vec3) -> Vec3 {
+        let (axis, offset) = (self.normal.cross(normal), position - self.position);
+        let change = |band: usize| axis.dot(self.by_rotation[band]) + offset.dot(self.by_translation[band]);
+        (self.radiance + Vec3::new(change(0), change(1), change(2))).max(Vec3::ZERO)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A record at `position` in a world where a ray brings what `radiance` says of its origin and direction, from a distance.
+    fn record(position: Vec3, normal: Vec3, stream: u32, world: &dyn Fn(Vec3, Vec3) -> (f32, f32)) -> Record {
+        let (radiance, distances): (Vec<Vec3>, Vec<f32>) = (0..RAYS)
+            .map(|k| {
+                let (l, d) = world(position, direction(normal, k, stream));
+                (Vec3::splat(l), d)
+            })
+            .unzip();
+        Record::new(position, normal, 0.1, &radiance, &distances).unwrap()
+    }
+
+    /// Light that depends on the direction only: `L = 1 + x` gives `E / pi = 1 + 2/3 n_x`.
+    #[test]
+    fn rotation() {
+        let world = |_: Vec3, d: Vec3| (1.0 + d.x, f32::INFINITY);
+        let record = record(Vec3::ZERO, Vec3::Z, 1, &world);
+        assert!((record.radiance.x - 1.0).abs() < 0.005, "{}", record.radiance);
+        for angle in [-0.2_f32, 0.1, 0.3] {
+            let normal = Vec3::new(angle.sin(), 0.0, angle.cos());
+            let expected = 1.0 + 2.0 / 3.0 * normal.x;
+            let found = record.at(Vec3::ZERO, normal).x;
+            // A stratified mean of 768, and the cosine of 0.3 that a gradient leaves out
+            assert!((found - expected).abs() < 0.02, "{angle}: {found} {expected}");
+        }
+    }
+
+    /// A ceiling whose light varies along x: the gradient against the difference of records made at both sides.
+    #[test]
+    fn translation() {
+        let ceiling = |p: Vec3, d: Vec3| {
+            let t = (1.0 - p.z) / d.z;
+            (1.0 + 0.5 * (2.0 * (p + t * d).x).sin(), t)
+        };
+        for x in [0.0, 0.4, 1.0] {
+            let at = |x: f32| Vec3::new(x, 0.2, 0.0);
+            let here = record(at(x), Vec3::Z, 3, &ceiling);
+            let mean =
+                |x: f32| (0..16).map(|s| record(at(x), Vec3::Z, 100 + s, &ceiling).radiance.x).sum::<f32>() / 16.0;
+            let expected = (mean(x + 0.2) - mean(x - 0.2)) / 0.4;
+            let found = (here.at(at(x + 0.1), Vec3::Z).x - here.at(at(x - 0.1), Vec3::Z).x) / 0.2;
+            assert!((found - expected).abs() < 0.05, "{x}: {found} {expected}");
+        }
+    }
+}
