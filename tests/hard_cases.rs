@@ -42,6 +42,7 @@ fn fixed([width, height]: [u32; 2], trials: u32) -> RenderParams {
         height,
         min_trials: trials,
         max_trials: trials,
+        interpolate: false,
         hires_error: 1.0,
         lores_error: 1.0,
         time_limit: None,

@@ -24,7 +24,13 @@ use report::{Case, Outcome, Row, table};
 type Recipe = fn(&Case, &mut Outcome<'_>);
 
 /// Cases that are known to fail, with the reason.
-const KNOWN: &[(&str, &str)] = &[];
+const KNOWN: &[(&str, &str)] = &[
+    (
+        "GSII-014",
+        "with the paper's box fit, which is not the default, and at `r_thresh` = 0.05 the clutter is several boxes and comes out 2 % too dark",
+    ),
+    ("GSII-015", "boxes let 2 % of the light through that solid blocks stop: clusters are fitted on average, not made tight"),
+];
 
 /// Processor time of this process so far, seconds; 0 where the system does not tell.
 fn processor_seconds() -> f64 {
