@@ -98,7 +98,8 @@ pub fn render(world: &World<'_>, camera: &Camera, params: &RenderParams, progres
     let over = || progress.stopped() || deadline.is_some_and(|d| Instant::now() >= d);
     let interpolate = params.interpolate && world.far.is_some_and(|far| far.r_thresh > 0.0 && far.r_thresh.is_finite());
     let stage = progress.stage("irradiance cache", 0);
-    let cache = interpolate.then(|| IrradianceCache::new(world, camera, [params.width, params.height], params.seed));
+    let size = [params.width, params.height];
+    let cache = interpolate.then(|| IrradianceCache::new(world, camera, size, params.seed, &over));
     stage.finish_and_clear();
     let filled = start.elapsed();
     let world = &World { cache: cache.as_ref(), ..*world };
