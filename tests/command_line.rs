@@ -500,6 +500,79 @@ fn light_from_outside_on_the_command_line() {
     assert_eq!(bench.files(), before);
 }
 
+/// Size of the images of the tests that interrupt writing: large enough that writing takes a while.
+const LARGE: [&str; 8] = ["--width", "640", "--height", "480", "--spp", "1", "--measure-bias", "0"];
+
+#[test]
+fn a_killed_run_leaves_complete_files_or_none() {
+    const KILLS: u32 = 12;
+    let bench = Bench::new();
+    let arguments = [&["render", "room.gltf", "-o", "a.exr", "-o", "a.png", "--stats", "a.json"], &LARGE[..]].concat();
+    let start = Instant::now();
+    assert!(bench.gsii(&arguments).status.success());
+    let whole = start.elapsed();
+    let names = ["a.exr", "a.png", "a.json"];
+    let (mut complete, mut absent) = (0, 0);
+    for kill in 0..KILLS {
+        names.iter().for_each(|name| drop(std::fs::remove_file(bench.path(name))));
+        let mut child = bench.command(&arguments).stderr(Stdio::null()).spawn().unwrap();
+        // Most of them near the end, where files are written.
+        let share = 1.0 - 0.6 * (f64::from(kill) / f64::from(KILLS)).powi(2);
+        std::thread::sleep(whole.mul_f64(share));
+        child.kill().unwrap();
+        child.wait().unwrap();
+        for name in names {
+            if !bench.path(name).exists() {
+                absent += 1;
+                continue;
+            }
+            complete += 1;
+            if name == "a.json" {
+                let _: serde_json::Value = serde_json::from_slice(&std::fs::read(bench.path(name)).unwrap()).unwrap();
+            } else {
+                let read = image::read(&bench.path(name)).unwrap();
+                assert_eq!((read.width(), read.height()), (640, 480), "{name}");
+            }
+        }
+    }
+    println!("{complete} complete files, {absent} absent");
+    // What was under way stays under a name of its own.
+    assert!(bench.files().iter().all(|f| f.starts_with('.') || f == "room.gltf" || names.contains(&f.as_str())));
+}
+
+/// Runs gsii with files limited to `kib` KiB, as on a disk that becomes full.
+#[cfg(unix)]
+fn with_little_space(bench: &Bench, kib: u32, arguments: &[&str]) -> Output {
+    // Without the trap the signal would end the process; dash counts in half KiB.
+    let script = format!("trap '' XFSZ; ulimit -f {}; exec \"$0\" \"$@\"", 2 * kib);
+    Command::new("sh")
+        .args(["-c", &script, env!("CARGO_BIN_EXE_gsii")])
+        .args(arguments)
+        .current_dir(bench.folder.path())
+        .stdin(Stdio::null())
+        .output()
+        .unwrap()
+}
+
+#[cfg(unix)]
+#[test]
+fn a_full_disk_is_one_clear_line() {
+    let bench = Bench::new();
+    let before = bench.files();
+    let quiet = ["render", "room.gltf", "--quiet"];
+    for name in ["a.exr", "a.png", "a.jpg", "a.tif", "a.hdr", "a.pfm"] {
+        let output = with_little_space(&bench, 16, &[&quiet[..], &LARGE, &["-o", name]].concat());
+        let text = stderr(&output);
+        assert_eq!(output.status.code(), Some(1), "{name}: {text}");
+        assert!(text.lines().count() == 1 && text.contains(name), "{text}");
+        assert_eq!(bench.files(), before, "{name}");
+    }
+    let output = with_little_space(&bench, 1, &["simplify", "room.gltf", "-o", "a.glb"]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(stderr(&output).lines().count() == 1 && stderr(&output).contains("a.glb"), "{}", stderr(&output));
+    assert_eq!(bench.files(), before);
+}
+
 #[test]
 fn files_are_stored_as_asked() {
     let bench = Bench::new();
@@ -550,4 +623,18 @@ fn manual_and_completions_know_every_option() {
     text(&["man", "--all", "pages"]);
     let pages: Vec<_> = std::fs::read_dir(bench.path("pages")).unwrap().collect();
     assert!(pages.len() >= 8 && bench.path("pages/gsii-render.1").exists(), "{pages:?}");
+}
+
+#[test]
+fn outputs_of_simplify_are_refused_in_one_line() {
+    let bench = Bench::new();
+    std::fs::create_dir(bench.path("there.glb")).unwrap();
+    let before = bench.files();
+    for target in ["no/such/folder/a.glb", "there.glb", "/proc/a.glb"] {
+        let output = bench.gsii(&["simplify", "room.gltf", "-o", target]);
+        assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+        assert!(stderr(&output).lines().count() == 1 && stderr(&output).contains(target), "{}", stderr(&output));
+    }
+    refused(&bench.gsii(&["simplify", "room.gltf", "--report", "a.txt"]), &["a.txt"]);
+    assert_eq!(bench.files(), before);
 }

@@ -74,7 +74,7 @@ fn radiosity_of_white_bodies_is_that_of_the_surroundings() {
     let settings = Settings { method: Method::Radiosity, radiosity_error: 0.05, ..Settings::default() };
     let (prepared, stats) = prepare(&scene, settings);
     let world = prepared.world();
-    let film = show_radiosity(&world, &world.far.unwrap(), &prepared.scene.cameras[0], &fixed(36, 24, 4, 0));
+    let film = show_radiosity(&world, &world.far.unwrap(), &prepared.scene.cameras[0], &fixed(36, 24, 4, 0)).film;
     let mean = Estimate::whole(&film).mean;
     println!("{mean}, radiosity error {}", stats.error.radiosity);
     // The error is that of the mean patch; the image shows many, whose errors partly cancel.

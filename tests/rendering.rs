@@ -185,7 +185,8 @@ fn interpolation_keeps_the_mean() {
     assert!(lores[1] < lores[0], "less noise with a quarter of the trials");
     let world = World { cache: Some(cache), ..prepared.world() };
     let camera = &prepared.scene.cameras[0];
-    let [without, with] = [prepared.world(), world].map(|world| bias::measure(&world, camera, 4.0 / 3.0, 1 << 16, 9));
+    let [without, with] =
+        [prepared.world(), world].map(|world| bias::measure(&world, camera, &fixed(96, 72, 1, 9), 1 << 16));
     for band in 0..3 {
         let change = (with.mean[band] - without.mean[band]) / without.reference[band];
         let error = with.standard_error[band].hypot(without.standard_error[band]) / without.reference[band];

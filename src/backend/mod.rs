@@ -4,6 +4,7 @@
 //! batches, so that one dynamic call and one crossing of the FFI serve thousands of rays.
 
 pub mod compare;
+pub mod edge;
 pub mod embree;
 pub mod obvhs;
 #[cfg(test)]

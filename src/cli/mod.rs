@@ -12,6 +12,7 @@ pub mod simplify;
 pub mod study;
 pub mod validate;
 
+use std::ffi::OsString;
 use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand};
@@ -53,9 +54,14 @@ enum Command {
     Completions(manual::CompletionOptions),
 }
 
-/// Runs the command line and returns its exit code.
+/// Runs the process's command line and returns its exit code.
 pub fn run() -> ExitCode {
-    let arguments = match Arguments::try_parse() {
+    run_with(std::env::args_os())
+}
+
+/// Runs a command line, the program's name first, and returns its exit code.
+pub fn run_with(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let arguments = match Arguments::try_parse_from(arguments) {
         Ok(arguments) => arguments,
         Err(error) => {
             // Help and version are no errors; clap prints them to standard output.

@@ -92,7 +92,8 @@ impl Prepared {
         auto::fill_in(&mut settings, &scene, detailed.as_ref(), cameras);
         let far = match settings.method {
             Method::Mcpt => None,
-            Method::Gsii if settings.r_thresh() == f32::INFINITY => None,
+            // Gather rays change to the far field at half of r_thresh or later: here none is as long.
+            Method::Gsii if 0.5 * settings.r_thresh() > scene.mesh.bounds.size().length() => None,
             _ => Some(Far::new(&scene, &lights, backend.as_ref(), &settings, progress, stats)?),
         };
         stats.parameters = settings.parameters();
@@ -303,6 +304,7 @@ impl Settings {
             error: self.radiosity_error,
             seed: self.seed,
             ambient: true,
+            leave_out_covered: true,
             max_patches: 400_000,
         }
     }

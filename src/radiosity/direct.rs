@@ -17,7 +17,7 @@ const PILOT_FAR: u32 = 2;
 /// Fewest samples of a side, and where it hardly matters.
 const LEAST: [u32; 2] = [4, 1];
 /// Most samples of a side.
-const MOST: u32 = 1024;
+const MOST: u32 = 1 << 14;
 /// Relevance below which a side hardly matters.
 const FAR: f64 = 0.05;
 /// Sides looked at by one job.
@@ -131,6 +131,9 @@ fn sample(
     index: u32,
     stream: u32,
 ) -> Option<(ShadowRay, DVec3)> {
+    if patches.is_inside_of_box(side) {
+        return None;
+    }
     let stream = sampling::hash_all(&[stream, side]);
     let s = sampling::sobol(index, 0, stream);
     let choice = sampling::sobol(index, 1, stream)[0];

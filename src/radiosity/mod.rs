@@ -48,6 +48,10 @@ pub struct RadiosityParams {
     /// Whether the effect of the unshot flux is estimated and added at the end. Without it radiosities are too low: in a
     /// closed room of reflectance rho by rho times the unshot share.
     pub ambient: bool,
+    /// Whether parts of a patch that something covers closely (within a tenth of its diameter) are left out of it. Without that a patch
+    /// is its whole area, as in the textbooks' form factors: exact for large patches that meet at an angle, too dark where furniture
+    /// stands against a wall.
+    pub leave_out_covered: bool,
     /// How direct light reaches the patches.
     pub direct: DirectLight,
     /// Relative statistical error to aim for: decides how many rays are shot.
@@ -69,6 +73,7 @@ impl RadiosityParams {
             max_patches: 400_000,
             unshot: 0.01,
             ambient: true,
+            leave_out_covered: true,
             direct: DirectLight::Gather,
             error: 0.02,
             focus: None,
@@ -170,7 +175,9 @@ pub fn solve(input: &RadiosityScene<'_>, params: &RadiosityParams, progress: &Pr
         ));
     }
     if !input.lights.is_empty() && patches.len() > 0 {
-        patches.leave_out_covered(input, params.seed);
+        if params.leave_out_covered {
+            patches.leave_out_covered(input, params.seed);
+        }
         if let Some(focus) = &params.focus {
             patches.weigh(input.geometry, focus);
         }

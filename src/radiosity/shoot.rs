@@ -10,7 +10,7 @@ use super::RadiosityScene;
 use super::ledger::Tally;
 use super::optics::Optics;
 use super::patches::Patches;
-use crate::backend::{Coherence, Hit, Ray, Visible};
+use crate::backend::{Coherence, Hit, Ray, Visible, edge};
 use crate::sampling;
 use crate::shading::{Bsdf, Lobes, SurfacePoint};
 use crate::simplify::TriangleSource;
@@ -23,14 +23,6 @@ const GROUP: u64 = 64;
 const MAX_CHAIN: usize = 32;
 /// Weight under which photons go on only with proportional probability.
 const ROULETTE: f32 = 0.25;
-
-/// Barycentric distance from a triangle's edge within which a hit is not trusted: where a wall ends at a floor, the floor beyond the
-/// wall may be met at the same rounded distance as the wall.
-const EDGE: f32 = 1e-6;
-/// How far such a ray is turned before it is traced again, radians at most.
-const TURN: f32 = 1e-4;
-/// How often a ray is traced again.
-const RETRIES: u8 = 4;
 
 /// Light of one patch side that is shot with equal shares over a number of rays.
 #[derive(Clone, Copy, Debug)]
@@ -73,16 +65,14 @@ impl Load {
         }
     }
 
-    /// The ray and load for another try, when `hit` lies on an edge. Scaling the axes apart keeps a grazing ray above the
-    /// surface it left, for surfaces along the axes at least.
-    fn again(&self, ray: &Ray, hit: &Hit, depth: u32) -> Option<(Ray, Load)> {
-        let inside = hit.u.min(hit.v).min(1.0 - hit.u - hit.v);
-        if inside > EDGE || self.retries == RETRIES {
+    /// The ray and load for another try, when `hit` lies on an edge, or once when it is a miss that is `doubtful`.
+    fn again(&self, ray: &Ray, hit: &Hit, doubtful: bool, depth: u32) -> Option<(Ray, Load)> {
+        let lost = doubtful && self.retries == 0 && !hit.is_hit();
+        if !(lost || edge::is_on_edge(hit)) || self.retries == edge::RETRIES {
             return None;
         }
         let mut random = self.random(depth);
-        let scale = Vec3::new(random(), random(), random()) * TURN + 1.0;
-        let ray = Ray { direction: (ray.direction * scale).normalize(), ..*ray };
+        let ray = edge::turned(ray, [random(), random(), random()]);
         Some((ray, Load { retries: self.retries + 1, ..*self }))
     }
 }
@@ -216,16 +206,17 @@ impl Tracer<'_> {
             self.input.rays.closest(&photons.rays, Visible::All, Coherence::Incoherent, hits);
             output.tally.rays += photons.rays.len() as u64;
             next.clear();
+            let doubtful = edge::misses_are_doubtful(hits);
             for ((ray, load), hit) in photons.rays.iter().zip(&photons.loads).zip(hits.iter()) {
                 let counts = deposit == Deposit::All || load.bent;
+                if let Some((ray, load)) = load.again(ray, hit, doubtful, depth as u32) {
+                    next.push(ray, load);
+                    continue;
+                }
                 if !hit.is_hit() {
                     if counts {
                         output.tally.escaped += load.flux;
                     }
-                    continue;
-                }
-                if let Some((ray, load)) = load.again(ray, hit, depth as u32) {
-                    next.push(ray, load);
                     continue;
                 }
                 let patch = self.patches.map.at(hit.triangle, hit.u, hit.v);

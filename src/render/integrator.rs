@@ -24,6 +24,7 @@ use super::film::{Feature, Tile};
 use super::nearness::Nearness;
 use super::path::{Arrival, Passes, Path, Shadow};
 use super::view::ViewRays;
+use crate::backend::edge::settle_edges;
 use crate::backend::{Coherence, Hit, Ray, RayScene, Visible};
 use crate::lighting::Lights;
 use crate::lighting::shadow::{ShadowBuffers, ShadowRay, light_visibility};
@@ -41,6 +42,10 @@ const ROULETTE_DEPTH: u32 = 3;
 
 /// ... and after which even one that lost nothing may end: light can be trapped in glass for ever.
 const CERTAIN_DEPTH: u32 = 32;
+
+/// Largest probability of going on after that. Variance stays finite where it is above the square of the reflectance that keeps a
+/// path alive: between walls of 0.99, a smaller one makes rare paths arbitrarily bright.
+const CERTAIN_SURVIVAL: f32 = 0.999;
 
 /// Random numbers of one path: one block of four for the camera, then two for each scattering event.
 const BLOCKS_PER_EVENT: u32 = 2;
@@ -81,8 +86,8 @@ pub struct Captured {
     pub normal: Vec3,
     /// Whether any part of the surface is diffuse.
     pub diffuse: bool,
-    /// Of the angle at which the surface is seen.
-    pub cosine: f32,
+    /// How much longer than across the ray the width of a pixel is on the surface, up to five times.
+    pub stretch: f32,
 }
 
 /// Where radiance beyond `r_thresh` comes from.
@@ -349,6 +354,7 @@ impl<'a> World<'a> {
         }
         ws.hits.resize(ws.rays.len(), Hit::MISS);
         self.detailed.closest(&ws.rays, Visible::All, coherence, &mut ws.hits);
+        settle_edges(self.detailed, &mut ws.rays, &mut ws.hits);
         for k in 0..ws.traced.len() {
             let (index, hit) = (ws.traced[k], ws.hits[k]);
             if hit.is_hit() {
@@ -376,6 +382,7 @@ impl<'a> World<'a> {
         ws.rays.extend(ws.far.iter().map(|&i| ws.paths[i as usize].ray));
         ws.hits.resize(ws.rays.len(), Hit::MISS);
         far.rays.closest(&ws.rays, Visible::All, Coherence::Incoherent, &mut ws.hits);
+        settle_edges(far.rays, &mut ws.rays, &mut ws.hits);
         ws.counts.far += ws.rays.len() as u64;
         for k in 0..ws.far.len() {
             let (index, hit) = (ws.far[k], ws.hits[k]);
@@ -558,8 +565,8 @@ impl<'a> World<'a> {
         match (path.gathers, capture) {
             (false, Some(captured)) => {
                 let diffuse = bsdf.albedo_diffuse() != Vec3::ZERO;
-                let cosine = outgoing.dot(point.geometric_normal).abs();
-                captured.push(Captured { path: next, point, normal: facing, diffuse, cosine });
+                let stretch = 1.0 / outgoing.dot(point.geometric_normal).abs().max(0.2);
+                captured.push(Captured { path: next, point, normal: facing, diffuse, stretch });
             }
             _ => ws.next.push(next),
         }
@@ -664,7 +671,7 @@ impl Workspace {
 /// Ends a path that brings little, or strengthens it by as much as others end; `u` in 0..1. Nothing is lost on average.
 /// With the path comes what is left of `u`: again a number in 0..1.
 fn roulette(path: Path, u: f32) -> Option<(Path, f32)> {
-    let most = if path.depth < CERTAIN_DEPTH { 1.0 } else { 0.95 };
+    let most = if path.depth < CERTAIN_DEPTH { 1.0 } else { CERTAIN_SURVIVAL };
     let survival = if path.depth < ROULETTE_DEPTH { 1.0 } else { path.throughput.max_element().min(most) };
     (u < survival).then(|| (Path { throughput: path.throughput / survival, ..path }, u / survival))
 }

@@ -114,14 +114,15 @@ pub fn render_rounds(
     progress: &Progress,
     watch: &mut dyn FnMut(&Round<'_>) -> bool,
 ) {
-    let cache = irradiance_cache(world, camera, params, progress);
+    let over = || progress.stopped();
+    let cache = irradiance_cache(world, camera, params, progress, &over);
     let world = &World { cache: cache.as_ref(), ..*world };
     let mut renderer = Renderer::new(world, camera, params);
     let mut film = params.film();
     let plan = renderer.everywhere(film.tiles.len(), params.max_trials);
     let bar =
         progress.stage("rendering", u64::from(params.max_trials) * u64::from(params.width) * u64::from(params.height));
-    renderer.rounds(&mut film, &plan, &|| progress.stopped(), &|n| bar.inc(n), watch);
+    renderer.rounds(&mut film, &plan, &over, &|n| bar.inc(n), watch);
     bar.finish_and_clear();
 }
 
@@ -133,7 +134,7 @@ pub fn render(world: &World<'_>, camera: &Camera, params: &RenderParams, progres
     let start = Stopwatch::start();
     let deadline = params.time_limit.map(|limit| Instant::now() + limit);
     let over = || progress.stopped() || deadline.is_some_and(|d| Instant::now() >= d);
-    let cache = irradiance_cache(world, camera, params, progress);
+    let cache = irradiance_cache(world, camera, params, progress, &over);
     let filled = start.spent();
     let world = &World { cache: cache.as_ref(), ..*world };
     let mut renderer = Renderer::new(world, camera, params);
@@ -165,11 +166,13 @@ fn irradiance_cache(
     camera: &Camera,
     params: &RenderParams,
     progress: &Progress,
+    over: &(dyn Fn() -> bool + Sync),
 ) -> Option<IrradianceCache> {
     let two_fields = world.far.is_some_and(|far| far.r_thresh > 0.0 && far.r_thresh.is_finite());
     let stage = progress.stage("irradiance cache", 0);
     let size = [params.width, params.height];
-    let cache = (params.interpolate && two_fields).then(|| IrradianceCache::new(world, camera, size, params.seed));
+    let cache =
+        (params.interpolate && two_fields).then(|| IrradianceCache::new(world, camera, size, params.seed, over));
     stage.finish_and_clear();
     cache
 }

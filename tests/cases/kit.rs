@@ -246,9 +246,9 @@ impl Room {
     }
 
     /// Area-weighted mean radiosity without emission of the fronts of triangles. Exact for triangles that lie in one patch;
-    /// otherwise a midpoint rule over 100 parts of each.
+    /// otherwise a midpoint rule over 4096 parts of each, fewer where there are thousands.
     pub fn mean_of(&self, solution: &Solution, triangles: &[u32]) -> DVec3 {
-        let n = if triangles.len() > 1000 { 1 } else { 10 };
+        let n = ((1e6 / triangles.len() as f64).sqrt() as u32).clamp(1, 64);
         let parts = f64::from(n * (n + 1) / 2) + f64::from(n * (n - 1) / 2);
         let mut sum = DVec3::ZERO;
         for &t in triangles {
@@ -287,10 +287,11 @@ pub fn simplify_params(r_thresh: f64, beta: f64, box_fit: BoxFit) -> SimplifyPar
     }
 }
 
-/// One patch a surface, light sources shoot: the paper's solver.
+/// One patch a surface, all of it, and light sources shoot: the paper's solver.
 pub fn one_patch(error: f64, seed: u32) -> RadiosityParams {
     RadiosityParams {
         unshot: 1e-4,
+        leave_out_covered: false,
         direct: DirectLight::Shoot,
         error: error as f32,
         seed,
@@ -398,16 +399,29 @@ pub fn all_parts(
     size: [u32; 2],
     trials: u32,
 ) -> Vec<[Estimate; 3]> {
-    let radiosity_is_used = settings.method != Method::Mcpt;
-    let seeds: Vec<u32> = (0..SEEDS).map(|s| hash_all(&[0xca5e, s])).collect();
-    let solutions = if radiosity_is_used { SEEDS as usize } else { 1 };
-    let prepared: Vec<Prepared> =
-        seeds[..solutions].iter().map(|&seed| prepare(scene, Settings { seed, ..settings.clone() }).unwrap()).collect();
-    let jobs: Vec<(usize, usize)> = (0..seeds.len()).flat_map(|s| (0..cameras.len()).map(move |c| (s, c))).collect();
+    all_parts_of(&prepare_seeds(scene, settings), cameras, size, trials)
+}
+
+/// Seed of the `s`-th measurement.
+fn seed_of(s: usize) -> u32 {
+    hash_all(&[0xca5e, s as u32])
+}
+
+/// The scene prepared once for each seed, or once where no radiosity solution depends on it.
+pub fn prepare_seeds(scene: &Arc<Scene>, settings: &Settings) -> Vec<Prepared> {
+    let with = |s: usize| prepare(scene, Settings { seed: seed_of(s), ..settings.clone() }).unwrap();
+    let first = with(0);
+    let solutions = if first.far.is_some() { SEEDS as usize } else { 1 };
+    [first].into_iter().chain((1..solutions).map(with)).collect()
+}
+
+/// [`all_parts`] of what [`prepare_seeds`] made.
+pub fn all_parts_of(prepared: &[Prepared], cameras: &[Camera], size: [u32; 2], trials: u32) -> Vec<[Estimate; 3]> {
+    let jobs: Vec<(usize, usize)> = (0..SEEDS as usize).flat_map(|s| (0..cameras.len()).map(move |c| (s, c))).collect();
     let values: Vec<[f64; 3]> = jobs
         .par_iter()
         .map(|&(s, c)| {
-            let film = image(&prepared[s % solutions], &cameras[c], size, trials, seeds[s]);
+            let film = image(&prepared[s % prepared.len()], &cameras[c], size, trials, seed_of(s));
             [Part::Direct, Part::Indirect, Part::All]
                 .map(|part| film.pixels().map(|p| part.of(p)[0]).sum::<f64>() / f64::from(size[0] * size[1]))
         })

@@ -2,9 +2,11 @@
 //! library's public interface and checked with their own tolerances.
 //!
 //! `cargo test --release --test cases -- FF RAD-01` runs the cases whose names contain one of the words. With
-//! `GSII_WRITE_ACCURACY=docs/accuracy.md` a complete run writes the table.
+//! `GSII_WRITE_ACCURACY=1` a complete run writes the table in `docs/accuracy.md`.
 
 mod cie;
+#[path = "../common/mod.rs"]
+mod common;
 mod direct_light;
 mod form_factors;
 mod gsii;
@@ -15,7 +17,6 @@ mod report;
 mod specular;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::time::Instant;
 
 use report::{Case, Outcome, Row, table};
 
@@ -23,10 +24,24 @@ use report::{Case, Outcome, Row, table};
 type Recipe = fn(&Case, &mut Outcome<'_>);
 
 /// Cases that are known to fail, with the reason.
-const KNOWN: &[(&str, &str)] = &[(
-    "RAD-018",
-    "long paths leak: of 3e6 bounces by path tracing some hundred end up in the other room, where walls meet exactly",
-)];
+const KNOWN: &[(&str, &str)] = &[
+    (
+        "GSII-014",
+        "with the paper's box fit, which is not the default, and at `r_thresh` = 0.05 the clutter is several boxes and comes out 2 % too dark",
+    ),
+    (
+        "GSII-015",
+        "boxes let 2 % of the light through that solid blocks stop: clusters are fitted on average, not made tight",
+    ),
+];
+
+/// Processor time of this process so far, seconds; 0 where the system does not tell.
+fn processor_seconds() -> f64 {
+    // User and system time are the 14th and 15th field, in hundredths; the second field is a name in parentheses.
+    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    let fields = stat.rsplit(')').next().unwrap_or_default().split_whitespace().skip(11).take(2);
+    fields.filter_map(|f| f.parse::<f64>().ok()).sum::<f64>() / 100.0
+}
 
 fn recipe(id: &str) -> Option<Recipe> {
     let all = [
@@ -60,13 +75,13 @@ fn main() {
             bad.push(case.id.as_str());
             continue;
         };
-        let start = Instant::now();
+        let start = processor_seconds();
         let mut outcome = Outcome::new(case);
         let measured = catch_unwind(AssertUnwindSafe(|| recipe(case, &mut outcome)));
         if measured.is_err() {
             outcome.holds("measured without a panic", false);
         }
-        let seconds = start.elapsed().as_secs_f64();
+        let seconds = processor_seconds() - start;
         let known = KNOWN.iter().find(|(id, _)| *id == case.id).map(|(_, reason)| *reason);
         let verdict = match (outcome.passes(), known) {
             (true, None) => "ok",
@@ -81,9 +96,13 @@ fn main() {
         rows.push(Row { outcome, known, seconds });
     }
     let passed = rows.iter().filter(|r| r.outcome.passes()).count();
-    println!("{passed} of {} reference cases pass; unexpected: {bad:?}", rows.len());
-    if let (Ok(path), true) = (std::env::var("GSII_WRITE_ACCURACY"), words.is_empty()) {
-        std::fs::write(path, table(&rows)).unwrap();
+    let seconds: f64 = rows.iter().map(|r| r.seconds).sum();
+    println!(
+        "{passed} of {} reference cases pass, in {seconds:.0} s of processor time; unexpected: {bad:?}",
+        rows.len()
+    );
+    if words.is_empty() {
+        common::write_accuracy("cases", &table(&rows));
     }
     if !bad.is_empty() {
         std::process::exit(1);

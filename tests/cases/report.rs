@@ -236,15 +236,16 @@ pub struct Row<'a> {
     pub outcome: Outcome<'a>,
     /// Why it is known to fail.
     pub known: Option<&'a str>,
+    /// Processor time.
     pub seconds: f64,
 }
 
-/// The contents of `docs/accuracy.md`.
+/// The table of all cases for `docs/accuracy.md`.
 pub fn table(rows: &[Row<'_>]) -> String {
     let passed = rows.iter().filter(|r| r.outcome.passes()).count();
-    let mut text = include_str!("accuracy_head.md").to_owned();
+    let mut text = String::new();
     let seconds: f64 = rows.iter().map(|r| r.seconds).sum();
-    writeln!(text, "\n**{passed} of {} cases pass**, in {seconds:.0} s.", rows.len()).unwrap();
+    writeln!(text, "\n**{passed} of {} cases pass**, in {seconds:.0} s of processor time.", rows.len()).unwrap();
     let mut family = "";
     for row in rows {
         let case = row.outcome.case;
@@ -256,16 +257,16 @@ pub fn table(rows: &[Row<'_>]) -> String {
         if section != family {
             family = section;
             let title = format!("{}{}", family[..1].to_uppercase(), &family[1..]);
-            writeln!(text, "\n## {title}\n").unwrap();
+            writeln!(text, "\n### {title}\n").unwrap();
             text += "| case | what | expected | measured | standard error | allowed | verdict |\n";
             text += "|---|---|---:|---:|---:|---:|---|\n";
         }
         text += &row.outcome.row(row.known);
     }
-    text += "\n## Sources\n\n";
+    text += "\n### Sources\n\n";
     for row in rows {
         let Case { id, source, .. } = row.outcome.case;
         writeln!(text, "- {id}: {source}").unwrap();
     }
-    text
+    text + "\n"
 }

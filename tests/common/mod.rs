@@ -208,3 +208,17 @@ pub fn threshold(alpha: f64, tests: usize) -> f64 {
     let each = 1.0 - (1.0 - alpha).powf(1.0 / tests as f64);
     Normal::standard().inverse_cdf(1.0 - 0.5 * each)
 }
+
+/// Puts `text` into the part of `docs/accuracy.md` that stands between the comments `<!-- name -->` and `<!-- end of name -->`, where
+/// the environment asks for it (`GSII_WRITE_ACCURACY=1`).
+pub fn write_accuracy(name: &str, text: &str) {
+    if std::env::var_os("GSII_WRITE_ACCURACY").is_none() {
+        return;
+    }
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("docs/accuracy.md");
+    let document = std::fs::read_to_string(&path).unwrap();
+    let (start, end) = (format!("<!-- {name} -->\n"), format!("<!-- end of {name} -->"));
+    let (before, rest) = document.split_once(&start).unwrap();
+    let (_, after) = rest.split_once(&end).unwrap();
+    std::fs::write(&path, format!("{before}{start}{text}{end}{after}")).unwrap();
+}

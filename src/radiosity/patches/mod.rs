@@ -199,6 +199,12 @@ impl Patches {
         }
     }
 
+    /// Whether a side looks into an equivalent box. Boxes stop light from outside only: no ray ever meets such a side, and light that it
+    /// gathered through the other faces would be there a second time.
+    pub fn is_inside_of_box(&self, side: u32) -> bool {
+        side % 2 == 1 && self.box_cell[side as usize / 2].is_some()
+    }
+
     /// Number of patches.
     pub fn len(&self) -> usize {
         self.area.len()

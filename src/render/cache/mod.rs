@@ -44,9 +44,6 @@ const TOLERANCE: f32 = 0.2;
 /// Least reach in pixels.
 const LEAST_PIXELS: f32 = 3.0;
 
-/// Surfaces that are seen at a smaller angle than this cosine's count as seen at it, when pixels are measured on them.
-const LEAST_COSINE: f32 = 0.2;
-
 /// Keeps the cache's random numbers apart from the image's.
 const STREAM: u32 = 0x6361_6368;
 
@@ -58,8 +55,14 @@ pub struct IrradianceCache {
 }
 
 impl IrradianceCache {
-    /// Fills a cache for one view. The same on any number of threads.
-    pub fn new(world: &World<'_>, camera: &Camera, size: [u32; 2], seed: u32) -> Self {
+    /// Fills a cache for one view. The same on any number of threads, unless `over` says that it must end.
+    pub fn new(
+        world: &World<'_>,
+        camera: &Camera,
+        size: [u32; 2],
+        seed: u32,
+        over: &(dyn Fn() -> bool + Sync),
+    ) -> Self {
         let Some(far) = &world.far else { return IrradianceCache::default() };
         let view = ViewRays::new(camera, size, hash_all(&[seed, STREAM]));
         let mut cache = IrradianceCache::default();
@@ -69,7 +72,8 @@ impl IrradianceCache {
                 .par_iter()
                 .enumerate()
                 .map_init(Workspace::default, |ws, (number, place)| {
-                    gather(world, far, ws, place, strata, hash_all(&[seed, STREAM, pass as u32, number as u32]))
+                    let stream = hash_all(&[seed, STREAM, pass as u32, number as u32]);
+                    if over() { None } else { gather(world, far, ws, place, strata, stream) }
                 })
                 .collect();
             cache.records.extend(fresh.into_iter().flatten());
@@ -91,10 +95,10 @@ impl IrradianceCache {
             inside.enumerate().map(|(i, p)| view.path(p, 2 * pass, i as u32)).collect()
         };
         let found = (0..rows).into_par_iter().map_init(Workspace::default, |ws, y| {
-            let reached = world
-                .first_gathers(ws, &row(y))
-                .into_iter()
-                .map(|captured| Place { footprint: view.footprint(captured.point.position), captured });
+            let reached = world.first_gathers(ws, &row(y)).into_iter().map(|captured| Place {
+                footprint: captured.stretch * view.footprint(captured.point.position),
+                captured,
+            });
             let covered = |p: &Place| {
                 let (position, normal) = (p.captured.point.position, p.captured.normal);
                 self.around(position, normal).map(|(weight, _)| weight).sum::<f32>() >= COVERED
