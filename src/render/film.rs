@@ -166,7 +166,7 @@ impl Region {
             let [w, h] = [size[0] / across, size[1] * across / parts].map(|n| f64::from(n.max(1)));
             (w / h).ln().abs()
         };
-        let divisors = (1..=parts).filter(|d| parts % d == 0);
+        let divisors = (1..=parts).filter(|d| parts.is_multiple_of(*d));
         let across = divisors.min_by(|a, b| wide(a).total_cmp(&wide(b)))?;
         let grid = [across, parts / across];
         let place = [number % across, number / across];

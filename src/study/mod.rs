@@ -167,7 +167,7 @@ pub fn run(options: &Options, progress: &Progress, say: &dyn Fn(&str)) -> Result
         let reference =
             reference::make(&folder("references"), &subject, trials, backend, &progress.quietly(), &mut || {
                 pace.advance(pass(&subject));
-                if pace.done / pass(&subject) % 8 == 0 {
+                if (pace.done / pass(&subject)).is_multiple_of(8) {
                     pace.report(&format!("{}: reference", subject.name));
                 }
             })?;
@@ -185,7 +185,7 @@ pub fn run(options: &Options, progress: &Progress, say: &dyn Fn(&str)) -> Result
             None => return Ok(false),
         }
     }
-    study.scaling.sort_by(|a, b| a.triangles.cmp(&b.triangles));
+    study.scaling.sort_by_key(|record| record.triangles);
     pace.bar.finish_and_clear();
     report::write(&study, &options.output)?;
     Ok(true)
