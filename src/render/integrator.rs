@@ -86,8 +86,6 @@ pub struct Captured {
     pub normal: Vec3,
     /// Whether any part of the surface is diffuse.
     pub diffuse: bool,
-    /// How much longer than across the ray the width of a pixel is on the surface, up to five times.
-    pub stretch: f32,
 }
 
 /// Where radiance beyond `r_thresh` comes from.
@@ -565,8 +563,7 @@ impl<'a> World<'a> {
         match (path.gathers, capture) {
             (false, Some(captured)) => {
                 let diffuse = bsdf.albedo_diffuse() != Vec3::ZERO;
-                let stretch = 1.0 / outgoing.dot(point.geometric_normal).abs().max(0.2);
-                captured.push(Captured { path: next, point, normal: facing, diffuse, stretch });
+                captured.push(Captured { path: next, point, normal: facing, diffuse });
             }
             _ => ws.next.push(next),
         }

@@ -95,10 +95,10 @@ impl IrradianceCache {
             inside.enumerate().map(|(i, p)| view.path(p, 2 * pass, i as u32)).collect()
         };
         let found = (0..rows).into_par_iter().map_init(Workspace::default, |ws, y| {
-            let reached = world.first_gathers(ws, &row(y)).into_iter().map(|captured| Place {
-                footprint: captured.stretch * view.footprint(captured.point.position),
-                captured,
-            });
+            let reached = world
+                .first_gathers(ws, &row(y))
+                .into_iter()
+                .map(|captured| Place { footprint: view.footprint(captured.point.position), captured });
             let covered = |p: &Place| {
                 let (position, normal) = (p.captured.point.position, p.captured.normal);
                 self.around(position, normal).map(|(weight, _)| weight).sum::<f32>() >= COVERED
