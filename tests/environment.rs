@@ -42,7 +42,7 @@ fn spotted() -> Environment {
     let texel = |i: usize| {
         let (x, y) = ((i % w) as f32 / w as f32, (i / w) as f32 / h as f32);
         let spot = if (x - 0.7).hypot(0.5 * y - 0.15) < 0.06 { 30.0 } else { 0.0 };
-        Vec3::new(0.5 + 0.4 * (6.28 * x).sin(), 0.6, 0.2 + y) + Vec3::splat(spot)
+        Vec3::new(0.5 + 0.4 * (std::f32::consts::TAU * x).sin(), 0.6, 0.2 + y) + Vec3::splat(spot)
     };
     Environment::new("spotted".to_owned(), [w, h], (0..w * h).map(texel).collect())
 }
