@@ -14,10 +14,10 @@ use gsii::backend::edge::settle_edges;
 use gsii::backend::obvhs::ObvhsBackend;
 use gsii::backend::{Coherence, Hit, Part, PartKind, Ray, RayBackend, TriangleSet, Visible};
 use gsii::pipeline::{Method, Settings};
-use gsii::radiosity::{DirectLight, RadiosityParams};
 use gsii::progress::Progress;
-use gsii::render::{RenderParams, bias, render};
+use gsii::radiosity::{DirectLight, RadiosityParams};
 use gsii::render::film::PixelSum;
+use gsii::render::{RenderParams, bias, render};
 use gsii::sampling::{hash_all, uniform_sphere, unit};
 use gsii::scene::{Material, MeshData};
 use gsii::shading::SurfacePoint;
@@ -245,7 +245,8 @@ fn small_things_in_huge_halls() {
         model.add("pencil", solid(v(-0.125, 0.0, 0.0), v(0.125, MILLIMETRE, MILLIMETRE)), grey(0.8));
         model.add("lamp", level([-0.125, 0.125], [0.25, 0.5], 0.5, false), glow(0.0, 10.0));
         if hall {
-            let black: Triangles = box_faces(DVec3::splat(-512.0), DVec3::splat(512.0)).iter().flat_map(|f| polygon(f)).collect();
+            let black: Triangles =
+                box_faces(DVec3::splat(-512.0), DVec3::splat(512.0)).iter().flat_map(|f| polygon(f)).collect();
             model.add("hall", black, grey(0.0));
         }
         model.finish()
@@ -285,7 +286,10 @@ fn floors_seen_at_a_grazing_angle_have_no_specks() {
     let [low, high, _] = range(&film);
     let expected = 0.5 / PI * slope / slope.hypot(1.0);
     // The sun's direction is f32: its slope is right to a few units in the last place of one.
-    assert!((low - expected).abs() < 0.01 * expected && high - low < 1e-3 * expected, "{low} .. {high}, not {expected}");
+    assert!(
+        (low - expected).abs() < 0.01 * expected && high - low < 1e-3 * expected,
+        "{low} .. {high}, not {expected}"
+    );
 }
 
 /// A triangle whose coordinates spread over 16 decades.
@@ -354,7 +358,8 @@ fn cameras_inside_of_clutter() {
     });
     model.add("clutter", blocks.collect(), grey(1.0));
     let scene = model.finish();
-    let settings = Settings { r_thresh: Some(0.3), patch_size: Some(0.25), radiosity_error: 0.02, ..Settings::default() };
+    let settings =
+        Settings { r_thresh: Some(0.3), patch_size: Some(0.25), radiosity_error: 0.02, ..Settings::default() };
     let cameras: Vec<_> = [v(1.0, 0.2, 0.1), v(-0.3, 0.1, 1.0), v(0.2, -1.0, 0.3)]
         .map(|towards| look_at(&scene, v(0.495, 0.495, 0.495), towards, 1e-3, 4e-3))
         .to_vec();
@@ -468,7 +473,10 @@ fn rays_at_vertices() {
                 // Batch by batch, as few of which would miss in rendering.
                 let mut inside: Vec<Ray> = rays.iter().map(|ray| Ray::new(origin, ray.direction)).collect();
                 inside.extend((0..64 * rays.len() as u32 / 50).map(|i| {
-                    Ray::new(origin, uniform_sphere(Vec2::new(unit(hash_all(&[seed, i, 5])), unit(hash_all(&[seed, i, 6])))))
+                    Ray::new(
+                        origin,
+                        uniform_sphere(Vec2::new(unit(hash_all(&[seed, i, 5])), unit(hash_all(&[seed, i, 6])))),
+                    )
                 }));
                 let mut hits = vec![Hit::MISS; inside.len()];
                 scene.closest(&inside, Visible::All, Coherence::Incoherent, &mut hits);

@@ -4,9 +4,9 @@
 //! `cargo test --release --test cases -- FF RAD-01` runs the cases whose names contain one of the words. With
 //! `GSII_WRITE_ACCURACY=1` a complete run writes the table in `docs/accuracy.md`.
 
+mod cie;
 #[path = "../common/mod.rs"]
 mod common;
-mod cie;
 mod direct_light;
 mod form_factors;
 mod gsii;
@@ -29,7 +29,10 @@ const KNOWN: &[(&str, &str)] = &[
         "GSII-014",
         "with the paper's box fit, which is not the default, and at `r_thresh` = 0.05 the clutter is several boxes and comes out 2 % too dark",
     ),
-    ("GSII-015", "boxes let 2 % of the light through that solid blocks stop: clusters are fitted on average, not made tight"),
+    (
+        "GSII-015",
+        "boxes let 2 % of the light through that solid blocks stop: clusters are fitted on average, not made tight",
+    ),
 ];
 
 /// Processor time of this process so far, seconds; 0 where the system does not tell.
@@ -94,7 +97,10 @@ fn main() {
     }
     let passed = rows.iter().filter(|r| r.outcome.passes()).count();
     let seconds: f64 = rows.iter().map(|r| r.seconds).sum();
-    println!("{passed} of {} reference cases pass, in {seconds:.0} s of processor time; unexpected: {bad:?}", rows.len());
+    println!(
+        "{passed} of {} reference cases pass, in {seconds:.0} s of processor time; unexpected: {bad:?}",
+        rows.len()
+    );
     if words.is_empty() {
         common::write_accuracy("cases", &table(&rows));
     }
