@@ -16,8 +16,6 @@ const PILOT: u32 = 8;
 const PILOT_FAR: u32 = 2;
 /// Fewest samples of a side, and where it hardly matters.
 const LEAST: [u32; 2] = [4, 1];
-/// Least relative standard deviation that is believed, in units of what is usual.
-const LEAST_SPREAD: f64 = 0.25;
 /// Most samples of a side.
 const MOST: u32 = 1 << 14;
 /// Relevance below which a side hardly matters.
@@ -57,12 +55,8 @@ pub(super) fn gather(input: &RadiosityScene<'_>, patches: &Patches, seed: u32, t
     let pilot = estimate(input, patches, &pilot_counts, stream(2));
     // Sum of standard errors is least for samples in proportion to (A sigma)^(2/3).
     let weighted = |side: usize| area(side) * patches.relevance[side / 2];
-    let flux_of = |side: usize| weighted(side) * pilot[side].mean.element_sum();
-    let flux: f64 = (0..sides).map(flux_of).sum();
-    let mut spread: Vec<f64> = pilot.iter().enumerate().map(|(s, e)| weighted(s) * e.variance.sqrt()).collect();
-    // A few samples may happen to be alike.
-    let usual = if flux > 0.0 { spread.iter().sum::<f64>() / flux } else { 0.0 };
-    spread.iter_mut().enumerate().for_each(|(side, x)| *x = x.max(LEAST_SPREAD * usual * flux_of(side)));
+    let spread: Vec<f64> = pilot.iter().enumerate().map(|(s, e)| weighted(s) * e.variance.sqrt()).collect();
+    let flux: f64 = pilot.iter().enumerate().map(|(s, e)| weighted(s) * e.mean.element_sum()).sum();
     let weight: f64 = spread.iter().map(|x| x.cbrt().powi(2)).sum();
     let per_weight = if flux > 0.0 { (weight / (target * flux)).powi(2) / 2.0 } else { 0.0 };
     let counts: Vec<u32> = spread
