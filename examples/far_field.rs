@@ -98,7 +98,7 @@ fn measure(path: &Path, mut settings: Settings, points: u32, rays_a_point: u32) 
     let everything = |surfaces: &[u32]| SimplifiedGeometry::complete(&scene, surfaces);
     let unclassified = everything(&vec![0; scene.mesh.triangles.len()]);
     let detailed = unclassified.build(&scene, backend.as_ref())?;
-    auto::fill_in(&mut settings, &scene, detailed.as_ref(), &camera);
+    auto::fill_in(&mut settings, &scene, detailed.as_ref(), std::slice::from_ref(&camera));
 
     let far = far_rays(&scene, detailed.as_ref(), &camera, settings.r_thresh(), points, rays_a_point);
     let mut reference = None;

@@ -8,6 +8,7 @@
 
 pub mod backend;
 pub mod cli;
+pub mod clock;
 pub mod error;
 pub mod image;
 pub mod lighting;
@@ -19,5 +20,6 @@ pub mod sampling;
 pub mod scene;
 pub mod shading;
 pub mod simplify;
+pub mod study;
 
 pub use error::{Error, Result};

@@ -24,6 +24,11 @@ impl Progress {
         Progress { visible: true, stop: Arc::default() }
     }
 
+    /// Draws nothing, but stops when this one does: for work that is a step of a longer one.
+    pub fn quietly(&self) -> Self {
+        Progress { visible: false, stop: Arc::clone(&self.stop) }
+    }
+
     /// Asks all work to stop at the next good moment, keeping what is there.
     pub fn stop(&self) {
         self.stop.store(true, Ordering::Relaxed);

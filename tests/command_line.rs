@@ -372,6 +372,134 @@ fn validate_finds_no_unexplained_difference() {
     refused(&bench.gsii(&["validate", "room.gltf", "--r-thresh", "inf"]), &["--r-thresh"]);
 }
 
+/// Names of all files below a folder, and when they were written.
+fn written(folder: &Path) -> Vec<(PathBuf, std::time::SystemTime)> {
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(folder).unwrap().map(Result::unwrap) {
+        if entry.path().is_dir() {
+            files.extend(written(&entry.path()));
+        } else {
+            files.push((entry.path(), entry.metadata().unwrap().modified().unwrap()));
+        }
+    }
+    files.sort();
+    files
+}
+
+#[test]
+fn a_study_goes_on_where_it_was_and_writes_its_report() {
+    let bench = Bench::new();
+    let small = ["--width", "16", "--reference-trials", "64", "--max-trials", "4", "--other-trials", "2"];
+    let arguments = [&["study", "room.gltf", "--scaling", "room.gltf", "-o", "report"], &small[..]].concat();
+    let mut child = bench.command(&arguments).stderr(Stdio::null()).spawn().unwrap();
+    let runs = bench.path("report/work/runs");
+    let deadline = Instant::now() + Duration::from_secs(300);
+    let finished =
+        || runs.is_dir() && written(&runs).iter().any(|(path, _)| path.extension().is_some_and(|e| e == "json"));
+    while !finished() && child.try_wait().unwrap().is_none() {
+        assert!(Instant::now() < deadline, "no run was finished");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    interrupt(&child);
+    child.wait().unwrap();
+    let json = |files: Vec<(PathBuf, std::time::SystemTime)>| -> Vec<_> {
+        files.into_iter().filter(|(path, _)| path.extension().is_some_and(|e| e == "json")).collect()
+    };
+    let before = json(written(&runs));
+    assert!(!before.is_empty());
+
+    let output = bench.gsii(&arguments);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let after = json(written(&runs));
+    assert!(before.iter().all(|file| after.contains(file)), "finished runs are kept");
+
+    let page = std::fs::read_to_string(bench.path("report/index.html")).unwrap();
+    assert!(page.contains("Table 4") && page.contains("data:image/jpeg") && page.contains("<svg"));
+    for reference in ["src=\"http", "href=\"http", "url(http", "@import"] {
+        assert!(!page.contains(reference), "the page asks for nothing: {reference}");
+    }
+    for table in ["table-1", "table-2", "table-3", "table-4", "crossings", "settings", "scaling"] {
+        let csv = std::fs::read_to_string(bench.path(&format!("report/tables/{table}.csv"))).unwrap();
+        assert!(csv.lines().count() >= 2, "{table} has rows: {csv}");
+    }
+    let study: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(bench.path("report/study.json")).unwrap()).unwrap();
+    let runs = study["scenes"][0]["runs"].as_array().unwrap();
+    let error = |role: &str| runs.iter().find(|r| r["role"] == role).unwrap()["points"][0]["whole"]["rel_mse"].as_f64();
+    assert!(error("mcpt").is_some_and(|e| e > 0.0) && error("radiosity-simple").is_some_and(|e| e > 0.0));
+}
+
+#[test]
+fn all_cameras_in_one_run() {
+    let bench = Bench::new();
+    let mut file: serde_json::Value = serde_json::from_str(&common::lit_room()).unwrap();
+    let nodes = file["nodes"].as_array_mut().unwrap();
+    let mut second = nodes.last().unwrap().clone();
+    second["name"] = "by the/door".into();
+    second["translation"][0] = 1.0.into();
+    nodes.push(second);
+    let number = nodes.len() - 1;
+    file["scenes"][0]["nodes"].as_array_mut().unwrap().push(number.into());
+    std::fs::write(bench.path("room.gltf"), file.to_string()).unwrap();
+    bench.render(&["--camera", "all", "-o", "a.exr", "-o", "a.png", "--stats", "a.json"]);
+    let files = bench.files();
+    let names =
+        ["a-by_the_door.exr", "a-by_the_door.json", "a-by_the_door.png", "a-eye.exr", "a-eye.json", "a-eye.png"];
+    assert_eq!(files, [&names[..], &["room.gltf"]].concat());
+    let [eye, door] =
+        ["a-eye.exr", "a-by_the_door.exr"].map(|name| image::read_with_metadata(&bench.path(name)).unwrap());
+    assert_ne!(eye.0, door.0, "two views");
+    assert_eq!(eye.1.get("gsii:camera"), Some(&Value::from("eye")));
+    assert_eq!(eye.1.get("gsii:r_thresh"), door.1.get("gsii:r_thresh"), "prepared once");
+    refused(&bench.gsii(&["info", "room.gltf", "--camera", "all"]), &["no camera 'all'"]);
+}
+
+#[test]
+fn light_from_outside_on_the_command_line() {
+    let bench = Bench::new();
+    // The room is closed: nothing changes inside but that its surroundings are there.
+    bench.render(&["-o", "plain.exr"]);
+    bench.render(&["-o", "sky.exr", "--sky", "--sun", "30,90", "--stats", "sky.json"]);
+    let stats: serde_json::Value = serde_json::from_slice(&std::fs::read(bench.path("sky.json")).unwrap()).unwrap();
+    assert_eq!((&stats["parameters"]["sky"], &stats["parameters"]["turbidity"]), (&true.into(), &3.0.into()));
+    assert!(stats["parameters"]["sun"].as_str().unwrap().starts_with("30"), "{stats}");
+    // What was rendered is an environment as good as any.
+    bench.render(&["-o", "env.png", "--environment", "plain.exr", "--environment-rotation", "-30"]);
+    let date = ["--date", "2026-06-21T12:00:00+02:00", "--place", "48.21,16.37"];
+    let output = bench.gsii(&[&["info", "room.gltf", "--contents", "--sky"], &date[..]].concat());
+    let text = String::from_utf8(output.stdout.clone()).unwrap();
+    // Solar noon is an hour later there: before it the sun is in the south-east, not far from its 65.2 degrees.
+    assert!(text.contains("clear sky") && text.contains("sun         62."), "{text}{}", stderr(&output));
+
+    let before = bench.files();
+    let cases: [(&[&str], &str); 8] = [
+        (&["--environment", "missing.exr"], "missing.exr"),
+        (&["--environment", "room.gltf"], "room.gltf"),
+        (&["--environment", "plain.exr", "--environment-strength=-1"], "--environment-strength"),
+        (&["--sky", "--sun", "100,0"], "--sun"),
+        (&["--sky", "--turbidity", "0"], "turbidity"),
+        (&["--sky", "--ground", "2"], "ground"),
+        (&["--sky", "--date", "2026-06-21T00:00:00+02:00", "--place", "48.21,16.37"], "below the horizon"),
+        (&["--sky", "--date", "2026-06-21T00:00:00+02:00", "--place", "148.21,16.37"], "position"),
+    ];
+    for (arguments, word) in cases {
+        refused(&bench.gsii(&[&["render", "room.gltf", "-o", "out.exr"], arguments].concat()), &[word]);
+    }
+    // Refused by the option parser.
+    for arguments in [
+        &["--sky", "--environment", "plain.exr"][..],
+        &["--sun", "30,90"],
+        &["--sky", "--sun", "30"],
+        &["--sky", "--date", "2026-06-21T00:00:00+02:00"],
+        &["--sky", "--date", "noon", "--place", "0,0"],
+        &["--environment-rotation", "10"],
+    ] {
+        let output = bench.gsii(&[&["render", "room.gltf", "-o", "out.exr"], arguments].concat());
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}", stderr(&output));
+    }
+    assert_eq!(bench.files(), before);
+}
+
 /// Size of the images of the tests that interrupt writing: large enough that writing takes a while.
 const LARGE: [&str; 8] = ["--width", "640", "--height", "480", "--spp", "1", "--measure-bias", "0"];
 
@@ -443,6 +571,58 @@ fn a_full_disk_is_one_clear_line() {
     assert_eq!(output.status.code(), Some(1));
     assert!(stderr(&output).lines().count() == 1 && stderr(&output).contains("a.glb"), "{}", stderr(&output));
     assert_eq!(bench.files(), before);
+}
+
+#[test]
+fn files_are_stored_as_asked() {
+    let bench = Bench::new();
+    bench.render(&["-o", "plain.exr", "-o", "plain.png"]);
+    bench.render(&["-o", "small.exr", "--half", "--tiled", "--compression", "piz", "--layers", "hires,depth"]);
+    let (_, header) = image::read_with_metadata(&bench.path("small.exr")).unwrap();
+    assert_eq!(header.get("compression"), Some(&Value::from("piz")));
+    // The format's version field says so in its tenth bit.
+    let tiled = |name: &str| std::fs::read(bench.path(name)).unwrap()[5] & 2 != 0;
+    assert_eq!(["small.exr", "plain.exr"].map(tiled), [true, false]);
+    let [plain, small] = ["plain.exr", "small.exr"].map(|name| image::read(&bench.path(name)).unwrap());
+    let [exact, half] = [&plain, &small].map(|image| image.channel("G").unwrap().to_vec());
+    assert_ne!(exact, half);
+    // Half precision keeps eleven bits.
+    assert!(exact.iter().zip(&half).all(|(a, b)| (a - b).abs() <= a.abs() / 2048.0 + 1e-7));
+    assert_eq!(plain.channel("depth.Z"), small.channel("depth.Z"), "other channels stay in single precision");
+    // A screen shows the room otherwise to someone who is adapted to it.
+    bench.render(&["-o", "seen.png", "--view", "perceptual"]);
+    assert_ne!(image::read(&bench.path("plain.png")).unwrap(), image::read(&bench.path("seen.png")).unwrap());
+}
+
+#[test]
+fn manual_and_completions_know_every_option() {
+    let bench = Bench::new();
+    let text = |arguments: &[&str]| {
+        let output = bench.gsii(arguments);
+        assert!(output.status.success(), "{arguments:?}: {}", stderr(&output));
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let help = text(&["render", "--help"]);
+    let options: Vec<&str> = help.split_whitespace().filter(|w| w.starts_with("--") && w.len() > 3).collect();
+    let options: Vec<&str> =
+        options.iter().map(|o| o.trim_end_matches(|c: char| !c.is_alphanumeric())).filter(|o| o.len() > 3).collect();
+    assert!(options.contains(&"--environment") && options.contains(&"--tile"));
+    // In troff a hyphen is written \-.
+    let page = text(&["man", "render"]).replace("\\-", "-");
+    assert!(page.contains(".TH gsii-render 1"), "{}", &page[..page.len().min(400)]);
+    let scripts = ["bash", "zsh", "fish"].map(|shell| text(&["completions", shell]));
+    for option in options {
+        assert!(page.contains(option), "{option} in the manual");
+        for script in &scripts {
+            assert!(script.contains(option.trim_start_matches('-')), "{option} in completions");
+        }
+    }
+    assert!(text(&["man"]).contains("merge"));
+    refused(&bench.gsii(&["man", "paint"]), &["paint", "render"]);
+    std::fs::create_dir(bench.path("pages")).unwrap();
+    text(&["man", "--all", "pages"]);
+    let pages: Vec<_> = std::fs::read_dir(bench.path("pages")).unwrap().collect();
+    assert!(pages.len() >= 8 && bench.path("pages/gsii-render.1").exists(), "{pages:?}");
 }
 
 #[test]

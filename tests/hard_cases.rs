@@ -43,6 +43,7 @@ fn fixed([width, height]: [u32; 2], trials: u32) -> RenderParams {
         min_trials: trials,
         max_trials: trials,
         interpolate: false,
+        region: None,
         hires_error: 1.0,
         lores_error: 1.0,
         time_limit: None,
@@ -417,7 +418,7 @@ fn bright_cards_are_kept_or_reported() {
     };
     let (hybrid, prepared) = mean(settings);
     let (traced, _) = mean(mcpt());
-    let meter = bias::measure(&prepared.world(), &camera, 1.0, 1 << 16, 7);
+    let meter = bias::measure(&prepared.world(), &camera, &RenderParams { seed: 7, ..fixed([16, 16], 1) }, 1 << 16);
     let off = hybrid.mean - traced.mean;
     let explained = meter.mean[0];
     let error = hybrid.error.hypot(traced.error).hypot(meter.standard_error[0]);

@@ -5,9 +5,14 @@
 
 mod common;
 
-use common::{Estimate, cluttered_room, fixed, gltf, lit_room, prepare, render, scene, threshold, values};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use common::{
+    Estimate, cluttered_room, fixed, gltf, interpolated, lit_room, prepare, render, scene, threshold, values,
+};
 use gsii::pipeline::{BackendKind, Method, Settings};
-use gsii::render::{RenderParams, bias, show::show_radiosity};
+use gsii::render::{RenderParams, World, bias};
 
 const ALPHA: f64 = 1e-4;
 
@@ -21,17 +26,13 @@ fn bits(values: &[f64]) -> Vec<u64> {
 
 fn image(settings: Settings, params: &RenderParams) -> Vec<f64> {
     let (prepared, _) = prepare(&scene(&lit_room()), settings);
-    if prepared.settings.method == Method::Radiosity {
-        let world = prepared.world();
-        return values(&show_radiosity(&world, &world.far.unwrap(), &prepared.scene.cameras[0], params));
-    }
     values(&render(&prepared, params).film)
 }
 
 #[test]
 fn the_number_of_threads_does_not_change_a_bit() {
     for method in [Method::Gsii, Method::Pmm, Method::Mcpt, Method::Radiosity] {
-        let adaptive = RenderParams { max_trials: 64, ..fixed(45, 30, 4, 0) };
+        let adaptive = RenderParams { max_trials: 64, ..interpolated(45, 30, 4, 0) };
         let images = [1, 2, 5].map(|threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| bits(&image(with(method), &adaptive)))
@@ -82,6 +83,60 @@ fn with_an_endless_near_field_gsii_is_path_tracing() {
     assert_ne!(bits(&gsii), bits(&image(with(Method::Pmm), &params)), "PMM is another method");
 }
 
+/// Scenes on which the limits of the method are checked: (name, file); those that are not at hand are left out.
+fn real_scenes() -> Vec<(&'static str, PathBuf)> {
+    let office = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/office-high.glb");
+    let shared = common::shared().map(|folder| folder.join("scenes"));
+    let others = ["cornell", "clutter"].map(|name| Some((name, shared.as_ref()?.join(format!("{name}.glb")))));
+    others.into_iter().flatten().chain([("office", office)]).collect()
+}
+
+#[test]
+fn the_limits_are_pmm_and_path_tracing_bit_for_bit_in_real_scenes() {
+    let params = fixed(24, 16, 4, 1);
+    for (name, path) in real_scenes() {
+        let scene = Arc::new(gsii::scene::load(&path, &Default::default()).unwrap());
+        let image = |settings: Settings| bits(&values(&render(&prepare(&scene, settings).0, &params).film));
+        for (r_thresh, method) in [(0.0, Method::Pmm), (f32::INFINITY, Method::Mcpt)] {
+            let gsii = image(Settings { r_thresh: Some(r_thresh), ..with(Method::Gsii) });
+            assert!(gsii == image(with(method)), "{name}: r_thresh {r_thresh} is not {method:?}");
+        }
+    }
+}
+
+/// `r_thresh` far larger than the scene: the far field is there and every ray asks it, but all light is found nearby. Pixel by pixel this
+/// must be path tracing, as far as other random numbers can tell: no pixel and band may be off by more than the largest of as many normal
+/// deviates is with probability [`ALPHA`].
+#[test]
+fn a_near_field_larger_than_the_scene_is_path_tracing_pixel_by_pixel() {
+    let (width, height, trials) = (36, 24, 256);
+    for (name, path) in real_scenes() {
+        let scene = Arc::new(gsii::scene::load(&path, &Default::default()).unwrap());
+        let r_thresh = Some(4.0 * scene.mesh.bounds.diagonal());
+        let (gsii, _) = prepare(&scene, Settings { r_thresh, ..with(Method::Gsii) });
+        assert!(gsii.far.is_some(), "the far field is there");
+        let (mcpt, _) = prepare(&scene, with(Method::Mcpt));
+        let a = render(&gsii, &fixed(width, height, trials, 31)).film;
+        let b = render(&mcpt, &fixed(width, height, trials, 32)).film;
+        let limit = threshold(ALPHA, 3 * 3 * (width * height) as usize);
+        let mut worst = 0.0f64;
+        for (i, (a, b)) in a.pixels().zip(b.pixels()).enumerate() {
+            for band in 0..3 {
+                let mean = |p: &gsii::render::film::Pixel| p.hires.mean()[band] + p.lores.mean()[band];
+                // Trials as if independent, passes as if fully correlated: an upper estimate of the error.
+                let dev = |p: &gsii::render::film::Pixel| p.hires.dev()[band] + p.lores.dev()[band];
+                let difference = (mean(a) - mean(b)).abs();
+                let z = if difference <= 1e-6 * mean(b) { 0.0 } else { difference / dev(a).hypot(dev(b)) };
+                worst = worst.max(z);
+                assert!(z < limit, "{name}: pixel {i}, band {band}: {} and {}, z {z:.2}", mean(a), mean(b));
+            }
+        }
+        let (a, b) = (Estimate::whole(&a), Estimate::whole(&b));
+        println!("{name}: largest z of a pixel {worst:.2} of {limit:.2}; means {a:?} {b:?}, z {:.2}", a.z(b));
+        assert!(a.z(b).abs() < threshold(ALPHA, 3), "{name}: {a:?} {b:?}");
+    }
+}
+
 /// Inside a closed room whose walls emit `radiance` and reflect `rho`, radiance is the same everywhere, `radiance / (1 - rho)`;
 /// white bodies that do not emit reflect just that and cannot be seen. So box fits, radiosity and both passes are exact here.
 #[test]
@@ -95,8 +150,15 @@ fn white_clutter_vanishes_in_a_furnace() {
         if (0.3..2.0).contains(&r_thresh) {
             assert!(stats.counts.complex > 0, "something is simplified at r_thresh {r_thresh}");
         }
+        // Interpolation between places that all see the same changes nothing, either.
+        let image = interpolated(36, 24, 16, 6);
+        let same = Estimate::whole(&render(&prepared, &image).film);
         let rendering = render(&prepared, &fixed(36, 24, 64, 5));
         let got = Estimate::whole(&rendering.film);
+        println!("r_thresh {r_thresh}: interpolated {same:?}, by pixel {got:?}");
+        // The noise of records is in no pixel's variance: hundreds of rays each, some hundred records.
+        let difference = (same.mean - got.mean).abs();
+        assert!(difference < 0.002 * exact + threshold(ALPHA, 5) * same.error.hypot(got.error), "{same:?} {got:?}");
         // The solution's own stated standard error belongs to all pixels together.
         let lores = rendering.film.mean(|p| p.lores.mean());
         let error = got.error.hypot(stats.error.radiosity * lores);
@@ -106,6 +168,30 @@ fn white_clutter_vanishes_in_a_furnace() {
         );
         let z = (got.mean - exact) / error;
         assert!(z.abs() < threshold(ALPHA, 5), "r_thresh {r_thresh}: {} is not {exact}, z = {z}", got.mean);
+    }
+}
+
+/// The bias meter, with the cache and without it, tells how far interpolation changes the mean of the image: not at all, to its
+/// standard error, or by less than half a percent.
+#[test]
+fn interpolation_keeps_the_mean() {
+    let room = scene(&lit_room());
+    let (prepared, _) = prepare(&room, with(Method::Gsii));
+    let images = [fixed(96, 72, 128, 3), interpolated(96, 72, 32, 4)].map(|params| render(&prepared, &params));
+    let cache = images[1].cache.as_ref().expect("GSII interpolates");
+    assert!(!cache.is_empty());
+    let lores = images.each_ref().map(|i| i.film.relative_errors().lores);
+    println!("{} records, noise of LORES {lores:?}", cache.len());
+    assert!(lores[1] < lores[0], "less noise with a quarter of the trials");
+    let world = World { cache: Some(cache), ..prepared.world() };
+    let camera = &prepared.scene.cameras[0];
+    let [without, with] =
+        [prepared.world(), world].map(|world| bias::measure(&world, camera, &fixed(96, 72, 1, 9), 1 << 16));
+    for band in 0..3 {
+        let change = (with.mean[band] - without.mean[band]) / without.reference[band];
+        let error = with.standard_error[band].hypot(without.standard_error[band]) / without.reference[band];
+        println!("band {band}: {change:.5} +- {error:.5}");
+        assert!(change.abs() < 0.005 + threshold(ALPHA, 3) * error, "band {band}: {change} +- {error}");
     }
 }
 
@@ -140,7 +226,7 @@ fn gsii_is_path_tracing_plus_the_measured_bias() {
     let (mcpt, _) = prepare(&office, with(Method::Mcpt));
     let a = Estimate::whole(&render(&gsii, &fixed(48, 32, 128, 21)).film);
     let b = Estimate::whole(&render(&mcpt, &fixed(48, 32, 128, 22)).film);
-    let measured = bias::measure(&gsii.world(), &office.cameras[0], 1.5, 1 << 16, 23);
+    let measured = bias::measure(&gsii.world(), &office.cameras[0], &fixed(48, 32, 1, 23), 1 << 16);
     let bias = measured.mean.iter().sum::<f64>() / 3.0;
     let bias_error = measured.standard_error.iter().sum::<f64>() / 3.0;
     let z = (a.mean - b.mean - bias) / a.error.hypot(b.error).hypot(bias_error);

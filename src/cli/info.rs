@@ -5,6 +5,7 @@ use std::process::ExitCode;
 use clap::Args;
 
 use super::options::{MethodOptions, SceneOptions, Talk, load, set_threads};
+use super::outside::OutsideOptions;
 use crate::error::Result;
 use crate::pipeline::{Prepared, Stats, choose_camera};
 use crate::scene::{LightKind, Projection, Scene};
@@ -14,6 +15,8 @@ use crate::scene::{LightKind, Projection, Scene};
 pub struct Options {
     #[command(flatten)]
     scene: SceneOptions,
+    #[command(flatten)]
+    outside: OutsideOptions,
     #[command(flatten)]
     method: MethodOptions,
     #[command(flatten)]
@@ -31,7 +34,8 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     set_threads(options.method.threads)?;
     let progress = options.talk.progress();
     let mut stats = Stats::new();
-    let scene = load(&options.scene, &mut stats)?;
+    let mut scene = load(&options.scene, &mut stats)?;
+    options.outside.surround(&mut scene)?;
     print_contents(&scene, stats.seconds.load);
     if options.contents {
         return Ok(ExitCode::SUCCESS);
@@ -59,6 +63,18 @@ fn print_contents(scene: &Scene, seconds: f64) {
             LightKind::Directional { .. } => "directional",
         };
         println!("  light       {} ({kind}), intensity {}", light.name, light.intensity);
+    }
+    if let Some(environment) = &scene.environment {
+        let [width, height] = environment.size();
+        println!("  outside     {}, {width} x {height} texels", environment.name);
+        if let Some(sun) = environment.sun() {
+            let d = sun.direction;
+            let azimuth = d.x.atan2(-d.z).to_degrees().rem_euclid(360.0);
+            println!(
+                "  sun         {:.1} degrees high, {azimuth:.1} clockwise from north (-z)",
+                d.y.asin().to_degrees()
+            );
+        }
     }
     for (i, camera) in scene.cameras.iter().enumerate() {
         let kind = match camera.projection {

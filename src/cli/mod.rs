@@ -2,15 +2,20 @@
 
 pub mod compare;
 pub mod info;
+pub mod manual;
+pub mod merge;
 pub mod options;
+pub mod output;
+pub mod outside;
 pub mod render;
 pub mod simplify;
+pub mod study;
 pub mod validate;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 
 use crate::error::Error;
 
@@ -31,14 +36,22 @@ struct Arguments {
 enum Command {
     /// Render an image of a glTF scene
     Render(render::Options),
+    /// Join the parts of an image that were rendered with --tile or --crop
+    Merge(merge::Options),
     /// Show what is in a scene and what would be done with it
     Info(info::Options),
     /// Write the simplified scene and say how well it stands for the detailed one
     Simplify(simplify::Options),
+    /// Speed against error of all methods: tables, plots and one page that shows them
+    Study(study::Options),
     /// Compare Embree with obvhs, ray by ray, on a scene's own rays
     Validate(validate::Options),
     /// Error metrics of an image against a reference
     Compare(compare::Options),
+    /// Print a manual page (troff: read it with 'gsii man render | man -l -')
+    Man(manual::ManOptions),
+    /// Print a script that completes commands and options in a shell
+    Completions(manual::CompletionOptions),
 }
 
 /// Runs the process's command line and returns its exit code.
@@ -59,10 +72,14 @@ pub fn run_with(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     };
     let outcome = match &arguments.command {
         Command::Render(options) => render::run(options),
+        Command::Merge(options) => merge::run(options),
         Command::Info(options) => info::run(options),
         Command::Simplify(options) => simplify::run(options),
+        Command::Study(options) => study::run(options),
         Command::Validate(options) => validate::run(options),
         Command::Compare(options) => compare::run(options),
+        Command::Man(options) => manual::man(options, Arguments::command()),
+        Command::Completions(options) => manual::completions(options, Arguments::command()),
     };
     match outcome {
         Ok(code) => code,

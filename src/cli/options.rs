@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 use std::str::FromStr;
 use std::sync::Arc;
-use std::time::Instant;
 
 use clap::Args;
 
+use crate::clock::Stopwatch;
 use crate::error::{Error, Result};
 use crate::pipeline::{BackendKind, GeometryKind, Method, Settings, Stats};
 use crate::progress::Progress;
@@ -33,7 +33,7 @@ impl FromStr for LengthOrAuto {
 pub struct SceneOptions {
     /// glTF 2.0 file (.glb or .gltf)
     pub scene: PathBuf,
-    /// Camera, by name or number (default: the first)
+    /// Camera, by name or number; 'gsii render' also takes 'all' [default: the first]
     #[arg(long, value_name = "NAME|INDEX")]
     pub camera: Option<String>,
 }
@@ -153,9 +153,9 @@ pub fn set_threads(threads: Option<usize>) -> Result<()> {
 /// # Errors
 /// As [`scene::gltf::load`].
 pub fn load(options: &SceneOptions, stats: &mut Stats) -> Result<Arc<Scene>> {
-    let start = Instant::now();
+    let start = Stopwatch::start();
     let scene = scene::gltf::load(&options.scene, &scene::gltf::LoadOptions::default())?;
-    stats.seconds.load = start.elapsed().as_secs_f64();
+    stats.record_time(start, |s| &mut s.load);
     for warning in &scene.notes.warnings {
         log::warn!("{}: {warning}", scene.name);
     }

@@ -2,28 +2,46 @@
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::time::{Duration, Instant};
+use std::str::FromStr;
+use std::time::Duration;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 
 use super::options::{MethodOptions, SceneOptions, Talk, load, set_threads};
+use super::output::{OutputOptions, names};
+use super::outside::OutsideOptions;
+use crate::clock::Stopwatch;
 use crate::error::{Error, Result};
-use crate::image::{self, Metadata, ViewTransform, WriteOptions};
+use crate::image::Metadata;
 use crate::pipeline::{Method, Prepared, Stats, choose_camera};
+use crate::progress::Progress;
 use crate::render::layers::{Layer, develop};
-use crate::render::{self, PassTimes, RayCounts, RenderParams, Rendering, World, bias};
-use crate::scene::Camera;
+use crate::render::{Region, RenderParams, Rendering, World, bias};
+use crate::scene::{Camera, Scene};
 
 /// Pairs of paths that measure the bias when not said otherwise.
 const BIAS_SAMPLES: u32 = 1 << 15;
 
-/// Tone curves by their names on the command line.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum View {
-    /// AgX: bright light bleaches instead of clipping.
-    Filmic,
-    /// Plain sRGB, clipped.
-    Srgb,
+/// In place of a camera's name: all of them.
+const ALL_CAMERAS: &str = "all";
+
+/// One of several parts: `2/4`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct PartOf {
+    /// From 1.
+    number: u32,
+    parts: u32,
+}
+
+impl FromStr for PartOf {
+    type Err = String;
+
+    fn from_str(s: &str) -> std::result::Result<Self, String> {
+        let part =
+            s.split_once('/').and_then(|(i, n)| Some(PartOf { number: i.parse().ok()?, parts: n.parse().ok()? }));
+        part.filter(|p| (1..=p.parts).contains(&p.number) && p.parts <= 1 << 16)
+            .ok_or_else(|| "expected the number of a part and how many there are, as in 2/4".to_owned())
+    }
 }
 
 /// Options of `gsii render`.
@@ -31,15 +49,20 @@ enum View {
 pub struct Options {
     #[command(flatten)]
     scene: SceneOptions,
-    /// Image to write, in any format OpenImageIO writes, by extension; may be repeated
-    #[arg(short, long, value_name = "IMAGE", required = true)]
-    output: Vec<PathBuf>,
+    #[command(flatten)]
+    output: OutputOptions,
     /// Width in pixels [default: 1280, or from the height and the camera]
     #[arg(long, value_name = "N")]
     width: Option<u32>,
     /// Height in pixels [default: from the width and the camera]
     #[arg(long, value_name = "N")]
     height: Option<u32>,
+    /// Render only pixels X0 to X1 - 1 across and Y0 to Y1 - 1 down, counted from the top left, as they are in the whole image
+    #[arg(long, value_names = ["X0", "Y0", "X1", "Y1"], num_args = 4, conflicts_with = "tile")]
+    crop: Option<Vec<u32>>,
+    /// Render only part I (from 1) of N that the image is cut into; 'gsii merge' joins them
+    #[arg(long, value_name = "I/N")]
+    tile: Option<PartOf>,
     /// Relative error of a pixel to aim for, in both passes
     #[arg(long, value_name = "X", help_heading = "Quality")]
     error: Option<f32>,
@@ -68,17 +91,13 @@ pub struct Options {
     #[arg(long, value_name = "N", default_value_t = BIAS_SAMPLES, help_heading = "Quality")]
     measure_bias: u32,
     #[command(flatten)]
+    outside: OutsideOptions,
+    #[command(flatten)]
     method: MethodOptions,
     /// Layers to write beside R,G,B where the format has named channels: hires, lores, hires_dev, lores_dev, albedo, normal,
     /// depth, trials, class, cluster, lookup_distance, near_share [default: all]
     #[arg(long, value_name = "NAME,...", value_delimiter = ',', help_heading = "Output")]
     layers: Option<Vec<Layer>>,
-    /// Stops by which formats for screens are brightened [default: automatic]
-    #[arg(long, value_name = "STOPS", allow_hyphen_values = true, help_heading = "Output")]
-    exposure: Option<f32>,
-    /// Tone curve of formats for screens
-    #[arg(long, value_enum, default_value_t = View::Filmic, help_heading = "Output")]
-    view: View,
     /// Write times, counts, errors and parameters as JSON
     #[arg(long, value_name = "FILE.json", help_heading = "Output")]
     stats: Option<PathBuf>,
@@ -91,59 +110,107 @@ pub struct Options {
 /// # Errors
 /// Bad options, bad input, a failing library, an image that cannot be written.
 pub fn run(options: &Options) -> Result<ExitCode> {
-    let start = Instant::now();
-    for path in &options.output {
-        image::check_writable(path)?;
-    }
+    let start = Stopwatch::start();
+    OutputOptions::check(&options.output.output)?;
     set_threads(options.method.threads)?;
     let progress = options.talk.progress();
     stop_on_ctrl_c(&progress);
 
     let mut stats = Stats::new();
-    let scene = load(&options.scene, &mut stats)?;
-    let camera = choose_camera(&scene, options.scene.camera.as_deref())?.clone();
-    let params = options.render_params(&camera)?;
-    let prepared = Prepared::new(scene, &camera, options.method.settings(), &progress, &mut stats)?;
+    let mut scene = load(&options.scene, &mut stats)?;
+    options.outside.surround(&mut scene)?;
+    let views = options.views(&scene)?;
+    let params = views.iter().map(|view| options.render_params(&view.camera)).collect::<Result<Vec<_>>>()?;
+    let cameras: Vec<Camera> = views.iter().map(|view| view.camera.clone()).collect();
+    let prepared = Prepared::for_cameras(scene, &cameras, options.method.settings(), &progress, &mut stats)?;
     for warning in &stats.warnings {
         log::warn!("{warning}");
     }
-    let rendering = options.render(&prepared, &camera, &params, &progress);
-    stats.record_rendering(&rendering);
-    if rendering.film.pixels().all(|p| p.hires.trials() == 0) {
-        options.talk.say("gsii: stopped before the first trial; nothing was written");
-        return Ok(ExitCode::FAILURE);
+    for (view, params) in views.iter().zip(&params) {
+        // Times and counts of the preparation belong to every view.
+        let mut stats = stats.clone();
+        if !options.render_view(&prepared, view, params, start, &progress, &mut stats)? {
+            options.talk.say("gsii: stopped before the first trial; nothing was written");
+            return Ok(ExitCode::FAILURE);
+        }
+        if progress.stopped() {
+            break;
+        }
     }
-    options.measure_bias(&prepared, &camera, &params, &rendering, &mut stats);
-    options.record_parameters(&params, rendering.stopped, &mut stats);
-
-    let written = Instant::now();
-    let developed = develop(&rendering.film, options.layers());
-    let metadata = metadata(&stats, &camera);
-    let write_options = WriteOptions {
-        exposure_stops: options.exposure.unwrap_or_else(|| image::auto_exposure(&developed)),
-        view: match options.view {
-            View::Filmic => ViewTransform::Filmic,
-            View::Srgb => ViewTransform::Srgb,
-        },
-        dither: true,
-        ..WriteOptions::default()
-    };
-    for path in &options.output {
-        image::write(path, &developed, &metadata, &write_options)?;
-    }
-    stats.seconds.write = written.elapsed().as_secs_f64();
-    stats.seconds.total = start.elapsed().as_secs_f64();
-    stats.peak_rss_bytes = peak_rss_bytes();
-    if let Some(path) = &options.stats {
-        write_stats(path, &stats)?;
-    }
-    options.summarise(&stats, rendering.stopped);
     Ok(ExitCode::SUCCESS)
+}
+
+/// A camera and where its image goes.
+struct View {
+    camera: Camera,
+    outputs: Vec<PathBuf>,
+    stats: Option<PathBuf>,
+}
+
+/// The path with a camera's name before its extension.
+fn of_camera(path: &Path, name: &str) -> PathBuf {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let extension = path.extension().map(|e| format!(".{}", e.to_string_lossy())).unwrap_or_default();
+    path.with_file_name(format!("{stem}-{name}{extension}"))
 }
 
 impl Options {
     fn layers(&self) -> &[Layer] {
         self.layers.as_deref().unwrap_or(&Layer::ALL)
+    }
+
+    /// The cameras that are asked for. With several, their names are in those of the files.
+    fn views(&self, scene: &Scene) -> Result<Vec<View>> {
+        if self.scene.camera.as_deref() != Some(ALL_CAMERAS) {
+            let camera = choose_camera(scene, self.scene.camera.as_deref())?.clone();
+            return Ok(vec![View { camera, outputs: self.output.output.clone(), stats: self.stats.clone() }]);
+        }
+        let harmless = |c: char| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' };
+        let mut names: Vec<String> = Vec::new();
+        let mut views = Vec::new();
+        for (number, camera) in scene.cameras.iter().enumerate() {
+            let mut name: String = camera.name.chars().map(harmless).collect();
+            if name.is_empty() || names.contains(&name) {
+                name = format!("{name}{number}");
+            }
+            let outputs: Vec<PathBuf> = self.output.output.iter().map(|path| of_camera(path, &name)).collect();
+            OutputOptions::check(&outputs)?;
+            let stats = self.stats.as_ref().map(|path| of_camera(path, &name));
+            views.push(View { camera: camera.clone(), outputs, stats });
+            names.push(name);
+        }
+        Ok(views)
+    }
+
+    /// Renders and writes one view. False when it was stopped before the first trial.
+    fn render_view(
+        &self,
+        prepared: &Prepared,
+        view: &View,
+        params: &RenderParams,
+        start: Stopwatch,
+        progress: &Progress,
+        stats: &mut Stats,
+    ) -> Result<bool> {
+        let camera = &view.camera;
+        let rendering = prepared.render(camera, params, progress);
+        stats.record_rendering(&rendering);
+        if rendering.film.pixels().all(|p| p.hires.trials() == 0) {
+            return Ok(false);
+        }
+        self.measure_bias(prepared, camera, params, &rendering, stats);
+        self.record_parameters(camera, params, rendering.stopped, stats)?;
+        let written = Stopwatch::start();
+        let developed = develop(&rendering.film, self.layers());
+        self.output.write(&view.outputs, &developed, &metadata(stats))?;
+        stats.record_time(written, |s| &mut s.write);
+        stats.record_time(start, |s| &mut s.total);
+        stats.peak_rss_bytes = peak_rss_bytes();
+        if let Some(path) = &view.stats {
+            write_stats(path, stats)?;
+        }
+        self.summarise(&view.outputs, stats, rendering.stopped);
+        Ok(true)
     }
 
     fn render_params(&self, camera: &Camera) -> Result<RenderParams> {
@@ -173,6 +240,7 @@ impl Options {
         Ok(RenderParams {
             width,
             height,
+            region: self.region([width, height])?,
             min_trials,
             max_trials,
             hires_error,
@@ -184,28 +252,24 @@ impl Options {
         })
     }
 
-    fn render(
-        &self,
-        prepared: &Prepared,
-        camera: &Camera,
-        params: &RenderParams,
-        progress: &crate::progress::Progress,
-    ) -> Rendering {
-        let world = prepared.world();
-        if let (Method::Radiosity, Some(far)) = (prepared.settings.method, world.far) {
-            let start = Instant::now();
-            let film = render::show::show_radiosity(&world, &far, camera, params);
-            let times = PassTimes { hires: start.elapsed(), lores: Duration::ZERO };
-            let view = film.pixels().map(|p| u64::from(p.hires.trials())).sum();
-            return Rendering {
-                film,
-                rays: RayCounts { view, ..RayCounts::default() },
-                times,
-                stopped: false,
-                cache: None,
-            };
+    /// The part of an image of `size` to render, where not all of it.
+    fn region(&self, size: [u32; 2]) -> Result<Option<Region>> {
+        if let Some(&[x0, y0, x1, y1]) = self.crop.as_deref() {
+            if x0 >= x1 || y0 >= y1 || x1 > size[0] || y1 > size[1] {
+                return Err(Error::Usage(format!(
+                    "--crop {x0} {y0} {x1} {y1} is no part of an image of {} x {} pixels: X0 < X1 <= {0} and Y0 < Y1 <= {1} are needed",
+                    size[0], size[1]
+                )));
+            }
+            return Ok(Some(Region { low: [x0, y0], high: [x1, y1] }));
         }
-        render::render(&world, camera, params, progress)
+        let Some(PartOf { number, parts }) = self.tile else { return Ok(None) };
+        Region::part(number - 1, parts, size).map(Some).ok_or_else(|| {
+            Error::Usage(format!(
+                "--tile {number}/{parts}: an image of {} x {} pixels has not so many parts",
+                size[0], size[1]
+            ))
+        })
     }
 
     fn measure_bias(
@@ -220,19 +284,24 @@ impl Options {
         if !gathers || prepared.far.is_none() || self.measure_bias == 0 || rendering.stopped {
             return;
         }
-        let start = Instant::now();
-        let aspect = params.width as f32 / params.height as f32;
+        let start = Stopwatch::start();
         let world = World { cache: rendering.cache.as_ref(), ..prepared.world() };
-        let bias = bias::measure(&world, camera, aspect, self.measure_bias, params.seed);
+        let bias = bias::measure(&world, camera, params, self.measure_bias);
         stats.record_bias(&bias, &rendering.film);
-        stats.seconds.bias = start.elapsed().as_secs_f64();
+        stats.record_time(start, |s| &mut s.bias);
     }
 
-    fn record_parameters(&self, params: &RenderParams, stopped: bool, stats: &mut Stats) {
+    fn record_parameters(
+        &self,
+        camera: &Camera,
+        params: &RenderParams,
+        stopped: bool,
+        stats: &mut Stats,
+    ) -> Result<()> {
         let map = &mut stats.parameters;
         for (key, value) in [
             ("scene", serde_json::json!(self.scene.scene.display().to_string())),
-            ("camera", serde_json::json!(self.scene.camera)),
+            ("camera", camera.name.as_str().into()),
             ("width", params.width.into()),
             ("height", params.height.into()),
             ("min_trials", params.min_trials.into()),
@@ -244,15 +313,18 @@ impl Options {
         ] {
             map.insert(key.to_owned(), value);
         }
+        if let Some(Region { low: [x0, y0], high: [x1, y1] }) = params.region {
+            map.insert("region".to_owned(), format!("{x0} {y0} {x1} {y1}").into());
+        }
+        self.outside.record(map)
     }
 
-    fn summarise(&self, stats: &Stats, stopped: bool) {
-        let outputs: Vec<String> = self.output.iter().map(|p| p.display().to_string()).collect();
+    fn summarise(&self, outputs: &[PathBuf], stats: &Stats, stopped: bool) {
         let s = &stats.seconds;
         let e = &stats.error;
         self.talk.say(format!(
             "{}{}: {:.1} s (load {:.1}, simplify {:.1}, build {:.1}, radiosity {:.1}, HIRES {:.1}, LORES {:.1})",
-            outputs.join(", "),
+            names(outputs),
             if stopped { " (stopped early, with the trials there were)" } else { "" },
             s.total,
             s.load,
@@ -274,7 +346,8 @@ impl Options {
     }
 }
 
-fn stop_on_ctrl_c(progress: &crate::progress::Progress) {
+/// The first Ctrl-C ends the work at the next good moment, the second one at once.
+pub(super) fn stop_on_ctrl_c(progress: &Progress) {
     let progress = progress.clone();
     // Fails only when a handler exists already (several runs in one process): the first one stays.
     let _ = ctrlc::set_handler(move || {
@@ -286,10 +359,9 @@ fn stop_on_ctrl_c(progress: &crate::progress::Progress) {
 }
 
 /// The run's parameters and errors for the file header.
-fn metadata(stats: &Stats, camera: &Camera) -> Metadata {
+fn metadata(stats: &Stats) -> Metadata {
     let mut metadata = Metadata::new();
     metadata.set("Software", format!("gsii {}", stats.version));
-    metadata.set("gsii:camera", camera.name.as_str());
     for (key, value) in &stats.parameters {
         let name = format!("gsii:{key}");
         match (value.as_i64(), value.as_f64(), value.as_str()) {

@@ -6,6 +6,7 @@
 
 mod buffer;
 mod input;
+mod merge;
 mod metadata;
 pub mod metrics;
 mod oiio;
@@ -18,6 +19,7 @@ mod tests;
 
 pub use buffer::{Channel, Image};
 pub use input::{read, read_with_metadata};
+pub use merge::{REGION, merge};
 pub use metadata::{Metadata, Value};
 pub use metrics::{CrossMetrics, Metrics, compare, compare_halves};
 pub use oiio::{library_version, set_threads, writable_extensions};

@@ -262,6 +262,15 @@ pub(super) enum Samples {
     },
 }
 
+/// How a file holds its pixels, where the format leaves a choice.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Layout<'a> {
+    /// OpenImageIO's name.
+    pub compression: Option<&'a str>,
+    /// Edge of square tiles, 0 for rows.
+    pub tile: u32,
+}
+
 /// Writes an image to exactly this path, in the format of its extension. A failure may leave half a file.
 pub(super) fn write(
     path: &Path,
@@ -269,7 +278,7 @@ pub(super) fn write(
     names: &[&str],
     samples: &Samples,
     metadata: &Metadata,
-    compression: Option<&str>,
+    layout: Layout,
 ) -> Attempt<()> {
     let (values, length, values_are, stored_as) = match samples {
         Samples::U8(values) => {
@@ -287,7 +296,7 @@ pub(super) fn write(
     let size = |value: usize| c_int::try_from(value).map_err(|_| "the image is too large".to_owned());
 
     let path = c_path(path)?;
-    let compression = compression.map(c_text).transpose()?;
+    let compression = layout.compression.map(c_text).transpose()?;
     let names = names.iter().map(|name| c_text(name)).collect::<Attempt<Vec<_>>>()?;
     let name_pointers: Vec<_> = names.iter().map(|name| name.as_ptr()).collect();
     let entries = metadata.iter().map(|(name, value)| Entry::new(name, value)).collect::<Attempt<Vec<_>>>()?;
@@ -304,6 +313,8 @@ pub(super) fn write(
         height: size(height as usize)?,
         channels: size(names.len())?,
         values_are,
+        tile: size(layout.tile as usize)?,
+        reserved: 0,
     };
     // SAFETY: every pointer in `image` belongs to a value that lives until the end of this function; the number of
     // values is width * height * channels, and there are `channels` names and types, as checked above.

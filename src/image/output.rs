@@ -6,7 +6,7 @@ use tempfile::NamedTempFile;
 
 use super::buffer::Image;
 use super::metadata::Metadata;
-use super::oiio::{self, Samples};
+use super::oiio::{self, Layout, Samples};
 use super::view::ViewTransform;
 use crate::error::{Error, Result};
 use crate::sampling::{hash_all, unit};
@@ -25,10 +25,12 @@ pub struct WriteOptions {
     pub half: bool,
     /// EXR and TIFF: compression; otherwise what OpenImageIO takes for the format (lossless `zip` for EXR).
     pub compression: Option<Compression>,
+    /// EXR and TIFF: square tiles instead of rows, for programs that read a large image in parts.
+    pub tiled: bool,
 }
 
 /// Compression of EXR files (TIFF knows `None` and `Zip`).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Compression {
     /// None: fastest, largest.
     None,
@@ -69,6 +71,9 @@ impl Compression {
         }
     }
 }
+
+/// Edge of the tiles of a tiled file, pixels: what texture systems expect.
+const TILE: u32 = 64;
 
 /// What a format stores.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -131,7 +136,8 @@ fn write_beside(path: &Path, image: &Image, metadata: &Metadata, options: &Write
     let encoding = Encoding::of(path)?;
     let file = temporary(path)?;
     let size = (image.width(), image.height());
-    let compression = options.compression.map(Compression::name);
+    let tile = if options.tiled { TILE } else { 0 };
+    let layout = Layout { compression: options.compression.map(Compression::name), tile };
     let (names, samples) = match encoding {
         Encoding::Layers => {
             let mut channels: Vec<_> = image.channels().iter().collect();
@@ -148,7 +154,7 @@ fn write_beside(path: &Path, image: &Image, metadata: &Metadata, options: &Write
         }
         Encoding::Screen => (vec!["R", "G", "B"], Samples::U8(for_screen(rgb(path, image)?, image.width(), options))),
     };
-    oiio::write(file.path(), size, &names, &samples, metadata, compression).map_err(|reason| failure(path, reason))?;
+    oiio::write(file.path(), size, &names, &samples, metadata, layout).map_err(|reason| failure(path, reason))?;
     Ok(file)
 }
 

@@ -366,7 +366,7 @@ fn a_full_disk_is_an_error() {
         std::os::unix::fs::symlink("/dev/full", &path).unwrap();
         let (names, values) = (["R", "G", "B"], vec![100u8; 3 * 8 * 8]);
         let samples = oiio::Samples::U8(values);
-        let result = oiio::write(&path, (8, 8), &names, &samples, &Metadata::new(), None);
+        let result = oiio::write(&path, (8, 8), &names, &samples, &Metadata::new(), oiio::Layout::default());
         assert!(result.expect_err(extension).contains("No space left"), "{extension}");
     }
 }

@@ -3,7 +3,7 @@
 use super::buffer::Image;
 
 /// How radiance outside of the range of a screen is treated.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum ViewTransform {
     /// Clipped at 1, then sRGB-encoded: exact where the image is not overexposed.
     Srgb,
@@ -12,6 +12,35 @@ pub enum ViewTransform {
     /// instead of turning to the primaries. Mid-grey, 0.18, is shown at half of the encoded range (0.21 linear).
     #[default]
     Filmic,
+    /// The perceptual tone reproduction of Tumblin and Rushmeier (1993), as revised by Tumblin, Hodgins and Guenter, "Two methods
+    /// for display of high contrast images" (1999): the image looks as bright, and as rich in contrast, to someone adapted to the
+    /// screen as the scene to someone adapted to it. A dark scene stays dark.
+    Perceptual {
+        /// Luminance that the observer of the scene is adapted to, cd/m^2.
+        adaptation: f64,
+    },
+}
+
+/// Luminance of white light of 1 W/(sr m^2) in each band, cd/m^2: the mean efficacy over the visible spectrum, as Radiance takes
+/// it.
+pub const EFFICACY: f64 = 179.0;
+/// Luminance of a screen's white, and what its observer is adapted to, cd/m^2.
+const SCREEN: [f64; 2] = [100.0, 20.0];
+/// Contrast of a screen.
+const SCREEN_CONTRAST: f64 = 100.0;
+
+/// Stevens' contrast sensitivity at a luminance of adaptation (cd/m^2), as Tumblin, Hodgins and Guenter fit it.
+fn contrast_sensitivity(luminance: f64) -> f64 {
+    if luminance > 100.0 { 2.655 } else { 1.855 + 0.4 * (luminance + 2.3e-5).log10() }
+}
+
+/// Factor from scene-referred colour to the screen's 0..1, for light of a luminance above 0.
+fn perceptual_scale(luminance: f64, adaptation: f64) -> f64 {
+    let [white, screen] = SCREEN;
+    let [of_scene, of_screen] = [adaptation, screen].map(contrast_sensitivity);
+    let overall = SCREEN_CONTRAST.sqrt().powf(of_scene / of_screen - 1.0);
+    let shown = overall * screen * (EFFICACY * luminance / adaptation).powf(of_scene / of_screen);
+    shown / white / luminance
 }
 
 /// AgX works with the logarithm of radiance between these.
@@ -32,12 +61,24 @@ const AGX_OUTSET: [[f32; 3]; 3] = [
 ];
 
 impl ViewTransform {
+    /// [`ViewTransform::Perceptual`] for someone who looks at this image: adapted to its log-average luminance.
+    pub fn perceptual(image: &Image) -> Self {
+        let logarithm = log_average(image).unwrap_or(0.0);
+        ViewTransform::Perceptual { adaptation: EFFICACY * logarithm.exp2() }
+    }
+
     /// Linear Rec. 709 radiance to values of 0..1 encoded for an sRGB screen. Negative and undefined radiance is
     /// black, infinite radiance is white.
     pub fn encode(self, rgb: [f32; 3]) -> [f32; 3] {
         let rgb = rgb.map(|value| value.max(0.0)); // max() also turns NaN into 0
         match self {
             ViewTransform::Srgb => rgb.map(|value| srgb_encode(value.min(1.0))),
+            ViewTransform::Perceptual { adaptation } => {
+                let rgb = rgb.map(|value| value.min(1e30));
+                let luminance = luminance(rgb);
+                let scale = if luminance > 0.0 { perceptual_scale(luminance, adaptation) } else { 0.0 };
+                rgb.map(|value| srgb_encode((f64::from(value) * scale).min(1.0) as f32))
+            }
             ViewTransform::Filmic => {
                 // Infinity would meet the negative entries of the outset as NaN; the curve is flat long before.
                 let inset = multiply(&AGX_INSET, rgb.map(|value| value.min(1e6)));
@@ -82,7 +123,13 @@ const TAILS: [f64; 2] = [0.01, 0.05];
 /// Exposure in stops that brings the geometric mean of the luminance to mid-grey, 0.18 (the log-average of Reinhard et
 /// al. 2002), between two percentiles and without black and undefined pixels. 0 if nothing is left.
 pub fn auto_exposure(image: &Image) -> f32 {
-    let Some([r, g, b]) = image.rgb_or_grey() else { return 0.0 };
+    log_average(image).map_or(0.0, |mean| (0.18f64.log2() - mean) as f32)
+}
+
+/// Mean of the logarithm (base 2) of the luminance, between two percentiles and without black and undefined pixels; `None` if
+/// nothing is left.
+fn log_average(image: &Image) -> Option<f64> {
+    let [r, g, b] = image.rgb_or_grey()?;
     let mut logarithms: Vec<f64> = (0..image.pixels())
         .map(|i| luminance([r[i], g[i], b[i]]))
         .filter(|luminance| luminance.is_finite() && *luminance > 0.0)
@@ -91,18 +138,15 @@ pub fn auto_exposure(image: &Image) -> f32 {
     logarithms.sort_by(f64::total_cmp);
     let count = logarithms.len() as f64;
     let kept = &logarithms[(count * TAILS[0]) as usize..logarithms.len() - (count * TAILS[1]) as usize];
-    if kept.is_empty() {
-        return 0.0;
-    }
-    let mean = kept.iter().sum::<f64>() / kept.len() as f64;
-    (0.18f64.log2() - mean) as f32
+    (!kept.is_empty()).then(|| kept.iter().sum::<f64>() / kept.len() as f64)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const VIEWS: [ViewTransform; 2] = [ViewTransform::Srgb, ViewTransform::Filmic];
+    const VIEWS: [ViewTransform; 3] =
+        [ViewTransform::Srgb, ViewTransform::Filmic, ViewTransform::Perceptual { adaptation: 30.0 }];
 
     #[test]
     fn greys_rise_from_black_to_white_and_stay_grey() {
@@ -156,5 +200,34 @@ mod tests {
         let mut black = Image::new(2, 2);
         black.push_rgb("", &[glam::Vec3::ZERO; 4]);
         assert_eq!(auto_exposure(&black), 0.0);
+    }
+
+    /// What an observer is adapted to is shown at the screen's own adaptation, darker at night and brighter by day (the factor
+    /// `sqrt(C)^(g - 1)`), and contrast between two greys is raised to the power `g`.
+    #[test]
+    fn perceptual_tones_follow_the_observer() {
+        let shown = |value: f32, adaptation: f64| {
+            let view = ViewTransform::Perceptual { adaptation };
+            f64::from(srgb_decode(view.encode([value; 3])[0]))
+        };
+        let at = |adaptation: f64| (adaptation / EFFICACY) as f32;
+        // Same adaptation as the screen's: nothing but a scale.
+        for factor in [0.1f32, 0.5, 1.0, 3.0] {
+            let got = shown(factor * at(20.0), 20.0);
+            assert!((got - 0.2 * f64::from(factor)).abs() < 1e-5, "{factor}: {got}");
+        }
+        let screen = 1.855 + 0.4 * 20f64.log10();
+        for (adaptation, sensitivity) in [(0.1, 1.455), (3000.0, 2.655)] {
+            let g = sensitivity / screen;
+            let middle = 0.2 * 10f64.powf(g - 1.0);
+            let got = shown(at(adaptation), adaptation);
+            assert!((got / middle - 1.0).abs() < 1e-3, "{adaptation}: {got} {middle}");
+            let ratio = shown(0.5 * at(adaptation), adaptation) / got;
+            assert!((ratio / 0.5f64.powf(g) - 1.0).abs() < 1e-3, "{adaptation}: {ratio}");
+        }
+        let mut grey = Image::new(10, 10);
+        grey.push_rgb("", &[glam::Vec3::splat(at(500.0)); 100]);
+        let ViewTransform::Perceptual { adaptation } = ViewTransform::perceptual(&grey) else { panic!() };
+        assert!((adaptation / 500.0 - 1.0).abs() < 1e-5);
     }
 }

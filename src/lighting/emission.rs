@@ -12,8 +12,8 @@ use crate::scene::{Aabb, LightKind, PunctualLight, Scene};
 #[derive(Clone, Copy, Debug)]
 pub struct EmittedRay {
     /// The ray. Its origin lies on the emitting triangle itself: before tracing, move it off the surface with
-    /// [`SurfacePoint::ray_origin`](crate::shading::point::SurfacePoint::ray_origin). Rays of directional lights start
-    /// outside of all triangles.
+    /// [`SurfacePoint::ray_origin`](crate::shading::point::SurfacePoint::ray_origin). Rays of directional lights and the
+    /// environment start outside of all triangles.
     pub ray: Ray,
     /// Flux that the ray stands for, W per band: the mean over rays is the flux of all lights.
     pub flux: Vec3,
@@ -43,7 +43,7 @@ pub(super) struct FluxTable {
     cumulative: Vec<f64>,
     /// Flux of all lights, W per band.
     pub total: [f64; 3],
-    /// Sphere around all triangles; directional lights emit from a disk of its radius.
+    /// Sphere around all triangles; directional lights and the environment emit from a disk of its radius.
     pub centre: Vec3,
     pub radius: f32,
 }
@@ -57,38 +57,52 @@ impl FluxTable {
             light.radiance.as_dvec3() * (std::f64::consts::PI * light.area() * faces)
         });
         let others = lights.punctual().map(|l| l.intensity.as_dvec3() * effective_extent(l, f64::from(radius)));
-        let fluxes: Vec<[f64; 3]> = areas.chain(others).map(|f| f.to_array()).collect();
-        let mut total = [0.0; 3];
+        let mut table = FluxTable { centre, radius, ..FluxTable::default() };
+        let outside = lights.environment.iter().map(|light| light.total * table.disk());
+        let fluxes: Vec<[f64; 3]> = areas.chain(others).chain(outside).map(|f| f.to_array()).collect();
         for flux in &fluxes {
-            for (sum, f) in total.iter_mut().zip(flux) {
+            for (sum, f) in table.total.iter_mut().zip(flux) {
                 *sum += f;
             }
         }
         let mut sum = 0.0;
-        let cumulative = fluxes
+        table.cumulative = fluxes
             .iter()
             .map(|flux| {
-                sum += super::band_shares(*flux, total);
+                sum += super::band_shares(*flux, table.total);
                 sum
             })
             .collect();
-        FluxTable { cumulative, total, centre, radius }
+        table
     }
 
-    /// A light and its probability.
-    fn choose(&self, u: f64) -> Option<(usize, f64)> {
+    /// Area of the disk from which light from infinity sets out.
+    fn disk(&self) -> f64 {
+        std::f64::consts::PI * f64::from(self.radius).powi(2)
+    }
+
+    /// A point of that disk for light that travels into `direction`.
+    fn on_disk(&self, direction: Vec3, u: [f32; 2]) -> Vec3 {
+        let disk = self.radius * concentric_disk(Vec2::from(u));
+        // A tenth farther than needed, so that rounding cannot put the disk inside
+        self.centre + basis(direction) * disk.extend(-1.1 * self.radius)
+    }
+
+    /// A light, its probability, and where within its share `u` lies, 0..1.
+    fn choose(&self, u: f64) -> Option<(usize, f64, f64)> {
         let sum = *self.cumulative.last()?;
         let target = u * sum;
         let i = self.cumulative.partition_point(|&c| c <= target).min(self.cumulative.len() - 1);
         let before = if i == 0 { 0.0 } else { self.cumulative[i - 1] };
         let probability = (self.cumulative[i] - before) / sum;
-        (probability > 0.0).then_some((i, probability))
+        let rest = ((target - before) / (self.cumulative[i] - before)).clamp(0.0, 1.0 - f64::EPSILON);
+        (probability > 0.0).then_some((i, probability, rest))
     }
 }
 
 impl Lights {
-    /// Flux that all light sources emit, W per band. Directional lights count with the part that meets a disk around the
-    /// scene's bounds.
+    /// Flux that all light sources emit, W per band. Directional lights and the environment count with the part that meets a disk
+    /// around the scene's bounds.
     pub fn flux(&self) -> [f64; 3] {
         self.emission.total
     }
@@ -110,7 +124,7 @@ impl Lights {
     /// A ray that leaves a light source, with a density proportional to the flux. `u[0]` chooses the light,
     /// `u[1..3]` the point, `u[3..5]` the direction. `None` where the chosen point of a textured light is black.
     pub fn sample_emission(&self, scene: &Scene, u: [f32; 5]) -> Option<EmittedRay> {
-        let (chosen, probability) = self.emission.choose(super::refined(u[0], [u[1], u[2]]))?;
+        let (chosen, probability, choice) = self.emission.choose(super::refined(u[0], [u[1], u[2]]))?;
         if let Some(light) = self.areas.lights.get(chosen) {
             let point = light.uniform_point([u[1], u[2]]);
             // Both faces: half of the first number's range each
@@ -127,16 +141,19 @@ impl Lights {
             let emitted = EmittedRay { ray, flux, triangle: point.triangle, uv: point.uv, front };
             return (flux.max_element() > 0.0).then_some(emitted);
         }
-        let light = self.punctual().nth(chosen - self.areas.lights.len())?;
+        let Some(light) = self.punctual().nth(chosen - self.areas.lights.len()) else {
+            let sample = self.environment.as_ref()?.sample_any(choice, [u[3], u[4]])?;
+            let extent = self.emission.disk() / (sample.pdf * probability);
+            let flux = (sample.radiance.as_dvec3() * extent).as_vec3();
+            let ray = Ray::new(self.emission.on_disk(-sample.direction, [u[1], u[2]]), -sample.direction);
+            let emitted = EmittedRay { ray, flux, triangle: Hit::NONE, uv: Vec2::ZERO, front: true };
+            return (flux.is_finite() && flux.max_element() > 0.0).then_some(emitted);
+        };
         let radius = self.emission.radius;
         let direction = emitted_direction(light, Vec2::new(u[3], u[4]));
         let origin = match light.kind {
             LightKind::Point { position } | LightKind::Spot { position, .. } => position,
-            LightKind::Directional { .. } => {
-                let disk = radius * concentric_disk(Vec2::new(u[1], u[2]));
-                // A tenth farther than needed, so that rounding cannot put the disk inside
-                self.emission.centre + basis(direction) * disk.extend(-1.1 * radius)
-            }
+            LightKind::Directional { .. } => self.emission.on_disk(direction, [u[1], u[2]]),
         };
         let extent = effective_extent(light, f64::from(radius)) / probability;
         let flux = (light.intensity.as_dvec3() * extent).as_vec3();

@@ -7,6 +7,8 @@ mod area;
 mod bilinear;
 mod bounds;
 mod emission;
+mod environment;
+mod openings;
 mod punctual;
 pub mod shadow;
 mod spherical;
@@ -17,13 +19,14 @@ mod tests;
 
 use glam::Vec3;
 
-use crate::backend::Hit;
+use crate::backend::{Hit, RayScene};
 use crate::sampling::{hash_all, unit};
 use crate::scene::{Aabb, LightKind, PunctualLight, Scene};
 use area::{AreaLight, AreaLights, Seen};
 use bounds::{Bounds, Cone, Emitter};
 use emission::FluxTable;
 pub use emission::{EmittedRay, EmittingTriangle};
+use environment::EnvironmentLight;
 use tree::{Leaf, LightTree};
 
 /// A sampled light source, seen from a point.
@@ -31,7 +34,7 @@ use tree::{Leaf, LightTree};
 pub struct LightSample {
     /// Unit direction from the point to the light.
     pub direction: Vec3,
-    /// Distance to the light; infinite for directional lights.
+    /// Distance to the light; infinite for directional lights and the environment.
     pub distance: f32,
     /// Radiance divided by the density of the sample (per solid angle), or for lights without area the irradiance on a
     /// facing surface divided by the probability of the light: multiply with `f cos` for an unbiased estimate.
@@ -53,12 +56,21 @@ pub struct Lights {
     directional_power: Vec<f64>,
     /// Over the area lights, then the finite ones.
     tree: LightTree,
+    environment: Option<EnvironmentLight>,
     emission: FluxTable,
     dropped: usize,
 }
 
+/// Probability of each kind of light at a point.
+#[derive(Clone, Copy, Debug)]
+struct Kinds {
+    finite: f64,
+    directional: f64,
+    environment: f64,
+}
+
 impl Lights {
-    /// Collects emitting triangles and punctual lights of `scene`.
+    /// Collects emitting triangles, punctual lights and the environment of `scene`.
     pub fn new(scene: &Scene) -> Self {
         let areas = AreaLights::new(scene);
         let shines = |l: &&PunctualLight| l.intensity.is_finite() && l.intensity.max_element() > 0.0;
@@ -68,15 +80,24 @@ impl Lights {
         let of = |v: Vec3| v.as_dvec3().to_array();
         let directional_power = shares_of_total(directional.iter().map(|l| of(l.intensity)).collect());
         let tree = LightTree::new(&leaves(&areas.lights, &finite));
-        let mut lights =
-            Lights { areas, finite, directional, directional_power, tree, emission: FluxTable::default(), dropped };
+        let environment = scene.environment.as_ref().and_then(EnvironmentLight::new);
+        let emission = FluxTable::default();
+        let mut lights = Lights { areas, finite, directional, directional_power, tree, environment, emission, dropped };
         lights.emission = FluxTable::new(&lights, &scene.mesh.bounds);
         lights
     }
 
+    /// Finds out what of the environment is seen from where, so that samples go to the openings. `rays` is built from `scene`.
+    /// Changes variances, not means.
+    pub fn look_out(&mut self, scene: &Scene, rays: &dyn RayScene, seed: u32) {
+        if let Some(light) = &mut self.environment {
+            light.look_out(scene, rays, seed);
+        }
+    }
+
     /// Whether there is none.
     pub fn is_empty(&self) -> bool {
-        self.tree.is_empty() && self.directional.is_empty()
+        self.tree.is_empty() && self.directional.is_empty() && self.environment.is_none()
     }
 
     /// How many triangles and lights were left out because they have no area or emit nothing.
@@ -89,15 +110,18 @@ impl Lights {
     ///
     /// A zero `normal` asks for light from all directions; otherwise samples from below the surface are `None`.
     pub fn sample(&self, scene: &Scene, position: Vec3, normal: Vec3, u: [f32; 3]) -> Option<LightSample> {
-        let mut choice = refined(u[0], [u[1], u[2]]);
-        let to_finite = self.probability_of_finite(position, normal)?;
-        if choice >= to_finite {
-            choice = (choice - to_finite) / (1.0 - to_finite);
-            return self.sample_directional(normal, choice, 1.0 - to_finite);
+        let choice = refined(u[0], [u[1], u[2]]);
+        let kinds = self.kinds(position, normal)?;
+        let within = |below: f64, share: f64| ((choice - below) / share).clamp(0.0, 1.0 - f64::EPSILON);
+        if choice >= kinds.finite + kinds.directional {
+            let choice = within(kinds.finite + kinds.directional, kinds.environment);
+            return self.sample_environment(position, normal, choice, [u[1], u[2]], kinds.environment);
         }
-        choice = (choice / to_finite).min(1.0 - f64::EPSILON);
-        let (light, probability) = self.tree.sample(position, normal, choice)?;
-        let probability = probability * to_finite;
+        if choice >= kinds.finite {
+            return self.sample_directional(normal, within(kinds.finite, kinds.directional), kinds.directional);
+        }
+        let (light, probability) = self.tree.sample(position, normal, within(0.0, kinds.finite))?;
+        let probability = probability * kinds.finite;
         let light = light as usize;
         let Some(area) = self.areas.lights.get(light) else {
             let light = &self.finite[light - self.areas.lights.len()];
@@ -136,10 +160,10 @@ impl Lights {
         if !above(normal, direction) {
             return 0.0;
         }
-        let Some(to_finite) = self.probability_of_finite(position, normal) else {
+        let Some(kinds) = self.kinds(position, normal) else {
             return 0.0;
         };
-        let probability = to_finite * self.tree.probability(position, normal, light as u32);
+        let probability = kinds.finite * self.tree.probability(position, normal, light as u32);
         if probability == 0.0 {
             return 0.0;
         }
@@ -147,19 +171,54 @@ impl Lights {
         (probability * self.areas.lights[light].density(position.as_dvec3(), normal, offset)) as f32
     }
 
-    /// Probability of choosing from the tree rather than a directional light: half, where both can reach the point. Which of
-    /// them is occluded matters more than how strong they are (the sun seldom reaches a room).
-    fn probability_of_finite(&self, position: Vec3, normal: Vec3) -> Option<f64> {
-        if self.directional.is_empty() {
-            return (!self.tree.is_empty()).then_some(1.0);
+    /// Radiance that a ray meets which leaves the scene into `direction`.
+    pub fn outside(&self, direction: Vec3) -> Vec3 {
+        self.environment.as_ref().map_or(Vec3::ZERO, |light| light.radiance(direction))
+    }
+
+    /// Density per solid angle with which [`Lights::sample`] would have chosen the unit `direction` into the environment.
+    pub fn pdf_outside(&self, position: Vec3, normal: Vec3, direction: Vec3) -> f32 {
+        match (&self.environment, self.kinds(position, normal)) {
+            (Some(light), Some(kinds)) if above(normal, direction) => {
+                (kinds.environment * light.pdf(position, normal, direction)) as f32
+            }
+            _ => 0.0,
         }
+    }
+
+    /// How probable the kinds of lights are: equally, where they can reach the point. Which of them is occluded matters more than
+    /// how strong they are (the sun seldom reaches a room).
+    fn kinds(&self, position: Vec3, normal: Vec3) -> Option<Kinds> {
+        let share = |reaches: bool| if reaches { 1.0 } else { 0.0 };
         let directional = self.directional.iter().any(|l| above(normal, towards(l)));
-        match (self.tree.reaches(position, normal), directional) {
-            (true, true) => Some(0.5),
-            (true, false) => Some(1.0),
-            (false, true) => Some(0.0),
-            (false, false) => None,
-        }
+        let (directional, environment) = (share(directional), share(self.environment.is_some()));
+        let alone = directional + environment == 0.0;
+        let finite = if alone { !self.tree.is_empty() } else { self.tree.reaches(position, normal) };
+        let sum = share(finite) + directional + environment;
+        let kinds =
+            || Kinds { finite: share(finite) / sum, directional: directional / sum, environment: environment / sum };
+        (sum > 0.0).then(kinds)
+    }
+
+    fn sample_environment(
+        &self,
+        position: Vec3,
+        normal: Vec3,
+        choice: f64,
+        u: [f32; 2],
+        probability: f64,
+    ) -> Option<LightSample> {
+        let sample = self.environment.as_ref()?.sample(position, normal, choice, u)?;
+        let pdf = sample.pdf * probability;
+        let weight = (sample.radiance.as_dvec3() / pdf).as_vec3();
+        let usable = above(normal, sample.direction) && weight.is_finite() && weight.max_element() > 0.0;
+        usable.then_some(LightSample {
+            direction: sample.direction,
+            distance: f32::INFINITY,
+            weight,
+            pdf: Some(pdf as f32),
+            triangle: Hit::NONE,
+        })
     }
 
     fn sample_directional(&self, normal: Vec3, u: f64, factor: f64) -> Option<LightSample> {

@@ -22,7 +22,7 @@ const PATCH_SHARE: f32 = 0.75;
 /// Patch size over the median gather ray where nothing is simplified.
 const COMPLETE_PATCH_SHARE: f32 = 0.08;
 
-/// What a camera's first gather rays tell about the room.
+/// What the cameras' first gather rays tell about the room.
 struct Surroundings {
     /// Median length of a gather ray.
     median: f32,
@@ -31,12 +31,12 @@ struct Surroundings {
 }
 
 /// Fills in what is `None`.
-pub fn fill_in(settings: &mut Settings, scene: &Scene, detailed: &dyn RayScene, camera: &Camera) {
+pub fn fill_in(settings: &mut Settings, scene: &Scene, detailed: &dyn RayScene, cameras: &[Camera]) {
     if settings.method == Method::Mcpt {
         settings.r_thresh = Some(f32::INFINITY);
         return;
     }
-    let surroundings = look_around(scene, detailed, camera);
+    let surroundings = look_around(scene, detailed, cameras);
     settings.focus = settings.focus.or(surroundings.as_ref().map(|s| s.focus));
     let median = surroundings.map_or(0.5 * scene.mesh.bounds.diagonal(), |s| s.median).max(f32::MIN_POSITIVE);
     if settings.method == Method::Pmm {
@@ -51,12 +51,14 @@ pub fn fill_in(settings: &mut Settings, scene: &Scene, detailed: &dyn RayScene, 
     });
 }
 
-/// Follows cosine-distributed rays from what the camera sees; `None` when they meet nothing.
-fn look_around(scene: &Scene, detailed: &dyn RayScene, camera: &Camera) -> Option<Surroundings> {
+/// Follows cosine-distributed rays from what the cameras see; `None` when they meet nothing.
+fn look_around(scene: &Scene, detailed: &dyn RayScene, cameras: &[Camera]) -> Option<Surroundings> {
     const STREAM: u32 = 0x6175_746f;
-    let views: Vec<Ray> = (0..PROBES)
+    let probes = if cameras.is_empty() { 0 } else { PROBES };
+    let views: Vec<Ray> = (0..probes)
         .map(|i| {
             let u = sobol(i, 0, STREAM);
+            let camera = &cameras[i as usize * cameras.len() / PROBES as usize];
             camera.ray(Vec2::new(u[0], u[1]), camera.aspect.unwrap_or(1.5))
         })
         .collect();

@@ -6,7 +6,6 @@ pub mod stats;
 pub mod validate;
 
 use std::sync::Arc;
-use std::time::Instant;
 
 pub use settings::{BackendKind, GeometryKind, Method, Settings};
 pub use stats::Stats;
@@ -14,11 +13,12 @@ pub use stats::Stats;
 use crate::backend::embree::EmbreeBackend;
 use crate::backend::obvhs::ObvhsBackend;
 use crate::backend::{RayBackend, RayScene, TriangleSet};
+use crate::clock::Stopwatch;
 use crate::error::{Error, Result};
 use crate::lighting::Lights;
 use crate::progress::Progress;
 use crate::radiosity::{self, RadiosityParams, RadiosityScene, Solution};
-use crate::render::{FarField, Nearness, World};
+use crate::render::{self, FarField, Nearness, RenderParams, Rendering, Round, World};
 use crate::scene::{Camera, Scene};
 use crate::shading::Lobes;
 use crate::simplify::{self, Simplified, SimplifiedGeometry, SimplifyParams, TriangleSource};
@@ -61,20 +61,35 @@ impl Prepared {
     pub fn new(
         scene: Arc<Scene>,
         camera: &Camera,
+        settings: Settings,
+        progress: &Progress,
+        stats: &mut Stats,
+    ) -> Result<Prepared> {
+        Self::for_cameras(scene, std::slice::from_ref(camera), settings, progress, stats)
+    }
+
+    /// As [`Prepared::new`], for several cameras: what is chosen from the scene suits all of them.
+    ///
+    /// # Errors
+    /// As [`Prepared::new`].
+    pub fn for_cameras(
+        scene: Arc<Scene>,
+        cameras: &[Camera],
         mut settings: Settings,
         progress: &Progress,
         stats: &mut Stats,
     ) -> Result<Prepared> {
         settings.check()?;
         let backend = settings.backend.create(settings.threads)?;
-        let start = Instant::now();
+        let start = Stopwatch::start();
         let detailed = build_detailed(&scene, backend.as_ref())?;
-        let lights = Lights::new(&scene);
-        stats.seconds.build += start.elapsed().as_secs_f64();
+        let mut lights = Lights::new(&scene);
+        lights.look_out(&scene, detailed.as_ref(), settings.seed);
+        stats.record_time(start, |s| &mut s.build);
         stats.backend = backend.name();
         stats.counts.triangles = scene.mesh.triangles.len() as u64;
 
-        auto::fill_in(&mut settings, &scene, detailed.as_ref(), camera);
+        auto::fill_in(&mut settings, &scene, detailed.as_ref(), cameras);
         let far = match settings.method {
             Method::Mcpt => None,
             // Gather rays change to the far field at half of r_thresh or later: here none is as long.
@@ -111,6 +126,35 @@ impl Prepared {
     }
 }
 
+impl Prepared {
+    /// Renders with the method that this was prepared for.
+    pub fn render(&self, camera: &Camera, params: &RenderParams, progress: &Progress) -> Rendering {
+        let world = self.world();
+        match (self.settings.method, world.far) {
+            (Method::Radiosity, Some(far)) => render::show::show_radiosity(&world, &far, camera, params),
+            _ => render::render(&world, camera, params, progress),
+        }
+    }
+
+    /// Renders with as many trials for every pixel, showing `watch` the image whenever their number has doubled; see
+    /// [`render::render_rounds`]. Radiosity is shown in one round.
+    pub fn render_rounds(
+        &self,
+        camera: &Camera,
+        params: &RenderParams,
+        progress: &Progress,
+        watch: &mut dyn FnMut(&Round<'_>) -> bool,
+    ) {
+        if self.settings.method == Method::Radiosity {
+            let trials = params.max_trials;
+            let rendering = self.render(camera, &RenderParams { min_trials: trials, ..params.clone() }, progress);
+            watch(&Round { film: &rendering.film, trials, rays: rendering.rays, times: rendering.times });
+        } else {
+            render::render_rounds(&self.world(), camera, params, progress, watch);
+        }
+    }
+}
+
 impl Far {
     fn new(
         scene: &Arc<Scene>,
@@ -120,7 +164,7 @@ impl Far {
         progress: &Progress,
         stats: &mut Stats,
     ) -> Result<Far> {
-        let start = Instant::now();
+        let start = Stopwatch::start();
         let simplified = simplify::simplify(scene, backend, &settings.simplify_params(), progress)?;
         stats.record_simplified(&simplified);
         let complete = settings.complete_geometry();
@@ -129,9 +173,9 @@ impl Far {
         } else {
             simplified.geometry.clone()
         };
-        stats.seconds.simplify += start.elapsed().as_secs_f64();
+        stats.record_time(start, |s| &mut s.simplify);
 
-        let start = Instant::now();
+        let start = Stopwatch::start();
         let rays = geometry.build(scene, backend)?;
         let nearness = (!complete).then(|| {
             let reach = 1.5 * settings.r_thresh();
@@ -139,13 +183,13 @@ impl Far {
             let dropped = simplified.surfaces.iter().filter(|s| s.class.is_isolated()).map(|s| s.bounds);
             Nearness::new(scene.mesh.bounds, clusters.chain(dropped), reach)
         });
-        stats.seconds.build += start.elapsed().as_secs_f64();
+        stats.record_time(start, |s| &mut s.build);
 
-        let start = Instant::now();
+        let start = Stopwatch::start();
         let clusters: &[_] = if complete { &[] } else { &simplified.clusters };
         let input = RadiosityScene { scene, lights, geometry: &geometry, clusters, rays: rays.as_ref() };
         let solution = radiosity::solve(&input, &settings.radiosity_params(), progress)?;
-        stats.seconds.radiosity += start.elapsed().as_secs_f64();
+        stats.record_time(start, |s| &mut s.radiosity);
         stats.record_solution(&solution);
         let plain = geometry.sources.iter().map(|source| is_plain(scene, source)).collect();
         Ok(Far { simplified: (!complete).then_some(simplified), geometry, rays, solution, plain, nearness })
@@ -177,12 +221,23 @@ pub fn simplify_only(
     settings.check()?;
     let backend = settings.backend.create(settings.threads)?;
     if settings.r_thresh.is_none() || settings.patch_size.is_none() {
-        let detailed = build_detailed(scene, backend.as_ref())?;
-        auto::fill_in(&mut settings, scene, detailed.as_ref(), camera);
+        settings = automatic(scene, camera, settings)?;
     }
     let simplified = simplify::simplify(scene, backend.as_ref(), &settings.simplify_params(), progress)?;
     stats.record_simplified(&simplified);
     Ok((simplified, settings))
+}
+
+/// Settings with every automatic choice filled in; nothing else is done.
+///
+/// # Errors
+/// Usage errors in the settings, backend failures.
+pub fn automatic(scene: &Arc<Scene>, camera: &Camera, mut settings: Settings) -> Result<Settings> {
+    settings.check()?;
+    let backend = settings.backend.create(settings.threads)?;
+    let detailed = build_detailed(scene, backend.as_ref())?;
+    auto::fill_in(&mut settings, scene, detailed.as_ref(), std::slice::from_ref(camera));
+    Ok(settings)
 }
 
 fn build_detailed(scene: &Arc<Scene>, backend: &dyn RayBackend) -> Result<Box<dyn RayScene>> {

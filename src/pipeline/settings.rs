@@ -1,6 +1,6 @@
 //! All that a user can choose, independent of the command line.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
 use crate::error::{Error, Result};
@@ -8,7 +8,7 @@ use crate::radiosity::{DirectLight, Focus};
 use crate::simplify::{self, BoxFit};
 
 /// The paper's methods.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Method {
     /// Radiosity on the simplified scene beyond `r_thresh`, path tracing within.
@@ -23,7 +23,7 @@ pub enum Method {
 }
 
 /// What radiosity is solved on, for `--method radiosity`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum GeometryKind {
     /// Normal and simple surfaces.
@@ -34,7 +34,7 @@ pub enum GeometryKind {
 }
 
 /// Ray-tracing libraries.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum BackendKind {
     /// Embree 4.

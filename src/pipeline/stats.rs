@@ -3,6 +3,7 @@
 use serde::Serialize;
 use serde_json::{Map, Value};
 
+use crate::clock::Stopwatch;
 use crate::radiosity::Solution;
 use crate::render::{Film, Rendering, bias::Bias};
 use crate::simplify::{Class, Simplified};
@@ -16,6 +17,8 @@ pub struct Stats {
     pub backend: String,
     /// Wall-clock seconds by stage.
     pub seconds: Seconds,
+    /// Seconds of all cores together by stage.
+    pub cpu_seconds: Seconds,
     /// Rays by stage.
     pub rays: Rays,
     /// How much there is of what.
@@ -32,7 +35,7 @@ pub struct Stats {
     pub warnings: Vec<String>,
 }
 
-/// Wall-clock seconds by stage.
+/// Seconds by stage.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Seconds {
     /// Reading the scene.
@@ -118,6 +121,13 @@ impl Stats {
         Stats { version: env!("CARGO_PKG_VERSION"), ..Stats::default() }
     }
 
+    /// Adds the time since `start` to a stage.
+    pub fn record_time(&mut self, start: Stopwatch, stage: impl Fn(&mut Seconds) -> &mut f64) {
+        let spent = start.spent();
+        *stage(&mut self.seconds) += spent.wall;
+        *stage(&mut self.cpu_seconds) += spent.cpu;
+    }
+
     /// Records what simplification found.
     pub fn record_simplified(&mut self, simplified: &Simplified) {
         let complex = simplified.surfaces.iter().filter(|s| s.class != Class::Normal).count() as u64;
@@ -144,8 +154,10 @@ impl Stats {
 
     /// Records both passes.
     pub fn record_rendering(&mut self, rendering: &Rendering) {
-        self.seconds.hires += rendering.times.hires.as_secs_f64();
-        self.seconds.lores += rendering.times.lores.as_secs_f64();
+        for (seconds, times) in [(&mut self.seconds, rendering.times), (&mut self.cpu_seconds, rendering.cpu_times)] {
+            seconds.hires += times.hires.as_secs_f64();
+            seconds.lores += times.lores.as_secs_f64();
+        }
         self.rays.hires += rendering.rays.hires();
         self.rays.lores += rendering.rays.lores();
         let errors = rendering.film.relative_errors();

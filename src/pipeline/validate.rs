@@ -115,7 +115,7 @@ pub fn validate(
         },
         &backends,
     )?;
-    auto::fill_in(&mut settings, scene, detailed.scenes[0].as_ref(), camera);
+    auto::fill_in(&mut settings, scene, detailed.scenes[0].as_ref(), std::slice::from_ref(camera));
     let geometry = simplify::simplify(scene, backends[0].as_ref(), &settings.simplify_params(), progress)?.geometry;
     let simplified =
         Pair::build(TriangleSet { filter: Some(geometry.filter(filter)), ..geometry.triangle_set() }, &backends)?;

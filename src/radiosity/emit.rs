@@ -24,7 +24,7 @@ pub(super) struct Emitted {
     pub shots: u64,
 }
 
-/// Shoots all light: emitting patches as any patch, with exactly their flux, and lights without area. Uses about `rays` rays.
+/// Shoots all light: emitting patches as any patch, with exactly their flux, and what shines without area or from outside. Uses about `rays` rays.
 pub(super) fn shoot_all(tracer: &Tracer<'_>, rays: u64, stream: u32) -> Emitted {
     let area = |side: u32| tracer.patches.open_area(side);
     let punctual = punctual(tracer.input.scene);
@@ -74,10 +74,11 @@ pub(super) fn shoot_bent(tracer: &Tracer<'_>, count: u64, stream: u32) -> Emitte
     Emitted { incident, flux: DVec3::ZERO, tally, shots: 1 }
 }
 
-/// The lights of `scene` that have no area.
+/// The lights of `scene` that have no area, and its environment.
 fn punctual(scene: &Scene) -> Lights {
     let mesh = Mesh { bounds: scene.mesh.bounds, ..Mesh::default() };
-    Lights::new(&Scene { mesh, lights: scene.lights.clone(), ..Scene::default() })
+    let environment = scene.environment.clone();
+    Lights::new(&Scene { mesh, lights: scene.lights.clone(), environment, ..Scene::default() })
 }
 
 /// Photons `range` of `count` from `lights`.

@@ -6,10 +6,11 @@
 
 use rayon::prelude::*;
 
+use super::RenderParams;
 use super::integrator::{Workspace, World};
 use super::path::Path;
 use crate::sampling::{hash_all, sobol};
-use crate::scene::Camera;
+use crate::scene::{Camera, Lens};
 use crate::shading::Lobes;
 use glam::{Vec2, Vec3};
 
@@ -45,8 +46,9 @@ impl Bias {
     }
 }
 
-/// Measures the bias with `samples` pairs of paths over the whole image.
-pub fn measure(world: &World<'_>, camera: &Camera, aspect: f32, samples: u32, seed: u32) -> Bias {
+/// Measures the bias with `samples` pairs of paths over the part of the image that `params` ask for.
+pub fn measure(world: &World<'_>, camera: &Camera, params: &RenderParams, samples: u32) -> Bias {
+    let view = View::new(camera, params);
     let gather_lobes = Lobes { least_roughness: 0.0, ..world.gather_lobes };
     let reference = World { far: None, gather_lobes, ..*world };
     let batches: Vec<Sums> = (0..samples.div_ceil(BATCH))
@@ -54,8 +56,8 @@ pub fn measure(world: &World<'_>, camera: &Camera, aspect: f32, samples: u32, se
         .map_init(Workspace::default, |ws, batch| {
             let first = batch * BATCH;
             let count = BATCH.min(samples - first);
-            let stream = hash_all(&[seed, STREAM, batch]);
-            let views: Vec<Path> = (0..count).map(|i| view_path(camera, aspect, i, stream)).collect();
+            let stream = hash_all(&[params.seed, STREAM, batch]);
+            let views: Vec<Path> = (0..count).map(|i| view.path(i, stream)).collect();
             let gathers: Vec<Path> = world.first_gathers(ws, &views).into_iter().map(|c| c.path).collect();
             // With a cache only the point is shared
             let start = if world.cache.is_some() { &views } else { &gathers };
@@ -77,9 +79,26 @@ pub fn measure(world: &World<'_>, camera: &Camera, aspect: f32, samples: u32, se
     total.bias()
 }
 
-fn view_path(camera: &Camera, aspect: f32, index: u32, stream: u32) -> Path {
-    let u = sobol(index, 0, stream);
-    Path::view(camera.ray(Vec2::new(u[0], u[1]), aspect), index, index, stream)
+/// Paths through random points of a part of an image.
+struct View {
+    lens: Lens,
+    /// Where it begins and how large it is, as shares of the whole image.
+    low: Vec2,
+    size: Vec2,
+}
+
+impl View {
+    fn new(camera: &Camera, params: &RenderParams) -> Self {
+        let whole = Vec2::new(params.width as f32, params.height as f32);
+        let region = params.region();
+        let share = |of: [u32; 2]| Vec2::new(of[0] as f32, of[1] as f32) / whole;
+        View { lens: camera.lens(whole.x / whole.y), low: share(region.low), size: share(region.size()) }
+    }
+
+    fn path(&self, index: u32, stream: u32) -> Path {
+        let u = sobol(index, 0, stream);
+        Path::view(self.lens.ray(self.low + Vec2::new(u[0], u[1]) * self.size), index, index, stream)
+    }
 }
 
 #[derive(Clone, Copy, Default)]

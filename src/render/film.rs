@@ -138,6 +138,47 @@ pub struct Pixel {
     pub feature: Feature,
 }
 
+/// A rectangle of pixels of an image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Region {
+    /// Left and top pixel.
+    pub low: [u32; 2],
+    /// The pixel after the right and bottom ones.
+    pub high: [u32; 2],
+}
+
+impl Region {
+    /// All of an image.
+    pub fn whole(size: [u32; 2]) -> Self {
+        Region { low: [0, 0], high: size }
+    }
+
+    /// Width and height.
+    pub fn size(&self) -> [u32; 2] {
+        [0, 1].map(|axis| self.high[axis] - self.low[axis])
+    }
+
+    /// Part `number` (from 0) of `parts` that an image is cut into, along the borders of film tiles; `None` when it has less tiles
+    /// across or down than parts are needed there.
+    pub fn part(number: u32, parts: u32, size: [u32; 2]) -> Option<Self> {
+        // As many across as makes the parts most nearly square.
+        let wide = |across: &u32| {
+            let [w, h] = [size[0] / across, size[1] * across / parts].map(|n| f64::from(n.max(1)));
+            (w / h).ln().abs()
+        };
+        let divisors = (1..=parts).filter(|d| parts.is_multiple_of(*d));
+        let across = divisors.min_by(|a, b| wide(a).total_cmp(&wide(b)))?;
+        let grid = [across, parts / across];
+        let place = [number % across, number / across];
+        let tiles = size.map(|n| n.div_ceil(TILE));
+        let border =
+            |axis: usize, i: u32| (u64::from(tiles[axis]) * u64::from(i) / u64::from(grid[axis])) as u32 * TILE;
+        let low = [0, 1].map(|axis| border(axis, place[axis]));
+        let high = [0, 1].map(|axis| border(axis, place[axis] + 1).min(size[axis]));
+        (low[0] < high[0] && low[1] < high[1]).then_some(Region { low, high })
+    }
+}
+
 /// A square of pixels that one thread works on at a time.
 #[derive(Clone, Debug)]
 pub struct Tile {
@@ -152,48 +193,54 @@ pub struct Tile {
 }
 
 impl Tile {
+    /// The empty tile in column and row `place` of an image of `size` pixels.
+    pub fn new(place: [u32; 2], size: [u32; 2]) -> Self {
+        let origin = place.map(|p| p * TILE);
+        let size = [0, 1].map(|axis| TILE.min(size[axis] - origin[axis]));
+        Tile { origin, size, pixels: vec![Pixel::default(); (size[0] * size[1]) as usize], dropped: 0 }
+    }
+
     /// Column and row of its pixel number `i`.
     pub fn pixel(&self, i: u32) -> [u32; 2] {
         [self.origin[0] + i % self.size[0], self.origin[1] + i / self.size[0]]
     }
 }
 
-/// An image in the making.
+/// An image in the making, or a part of one.
 #[derive(Clone, Debug)]
 pub struct Film {
     /// Width in pixels.
     pub width: u32,
     /// Height in pixels.
     pub height: u32,
-    /// Tiles, row by row.
+    /// Left and top pixel within the whole image.
+    pub origin: [u32; 2],
+    /// Tiles, row by row: all those of the whole image that hold a pixel of this film. Tiles are rendered whole, so that a
+    /// pixel does not depend on which part of the image it is rendered for.
     pub tiles: Vec<Tile>,
 }
 
 impl Film {
-    /// An empty film.
+    /// An empty film of a whole image.
     pub fn new(width: u32, height: u32) -> Self {
-        let mut tiles = Vec::new();
-        for y in (0..height).step_by(TILE as usize) {
-            for x in (0..width).step_by(TILE as usize) {
-                let size = [TILE.min(width - x), TILE.min(height - y)];
-                let pixels = vec![Pixel::default(); (size[0] * size[1]) as usize];
-                tiles.push(Tile { origin: [x, y], size, pixels, dropped: 0 });
-            }
-        }
-        Film { width, height, tiles }
+        Film::of(Region::whole([width, height]), [width, height])
     }
 
-    /// Number of tiles in a row.
-    pub fn tiles_across(&self) -> usize {
-        self.width.div_ceil(TILE) as usize
+    /// An empty film of a part of an image of `size`.
+    pub fn of(region: Region, size: [u32; 2]) -> Self {
+        let [rows, columns] = [1, 0].map(|axis| region.low[axis] / TILE..region.high[axis].div_ceil(TILE));
+        let tiles = rows.flat_map(|y| columns.clone().map(move |x| Tile::new([x, y], size))).collect();
+        let [width, height] = region.size();
+        Film { width, height, origin: region.low, tiles }
     }
 
     /// All pixels row by row.
     pub fn pixels(&self) -> impl Iterator<Item = &Pixel> {
-        let across = self.tiles_across();
-        (0..self.height).flat_map(move |y| {
-            (0..self.width).map(move |x| {
-                let tile = &self.tiles[(y / TILE) as usize * across + (x / TILE) as usize];
+        let first = self.origin.map(|low| low / TILE);
+        let across = (self.origin[0] + self.width).div_ceil(TILE) - first[0];
+        (self.origin[1]..self.origin[1] + self.height).flat_map(move |y| {
+            (self.origin[0]..self.origin[0] + self.width).map(move |x| {
+                let tile = &self.tiles[((y / TILE - first[1]) * across + x / TILE - first[0]) as usize];
                 &tile.pixels[((y % TILE) * tile.size[0] + x % TILE) as usize]
             })
         })
@@ -270,16 +317,41 @@ mod tests {
         assert_eq!(sum.halves().unwrap(), ([2.0, 0.0, -2.0], [3.0, 0.0, -3.0]));
     }
 
-    #[test]
-    fn pixels_come_row_by_row_for_odd_sizes() {
-        let mut film = Film::new(19, 11);
+    /// Numbers of the pixels of a film of 19 x 11 pixels, or of a part of it.
+    fn order(mut film: Film) -> Vec<u32> {
         for tile in &mut film.tiles {
             for i in 0..tile.pixels.len() as u32 {
                 let (x, y) = (tile.origin[0] + i % tile.size[0], tile.origin[1] + i / tile.size[0]);
                 tile.pixels[i as usize].feature.hits = y * 19 + x;
             }
         }
-        let order: Vec<u32> = film.pixels().map(|p| p.feature.hits).collect();
-        assert_eq!(order, (0..19 * 11).collect::<Vec<_>>());
+        film.pixels().map(|p| p.feature.hits).collect()
+    }
+
+    #[test]
+    fn pixels_come_row_by_row_for_odd_sizes() {
+        assert_eq!(order(Film::new(19, 11)), (0..19 * 11).collect::<Vec<_>>());
+        for (low, high) in [([9, 8], [17, 11]), ([3, 2], [4, 3]), ([7, 0], [19, 9])] {
+            let wanted = (low[1]..high[1]).flat_map(|y| (low[0]..high[0]).map(move |x| y * 19 + x));
+            assert_eq!(order(Film::of(Region { low, high }, [19, 11])), wanted.collect::<Vec<_>>());
+        }
+    }
+
+    #[test]
+    fn parts_cover_an_image_once() {
+        for (size, parts) in [([19, 11], 3), ([640, 360], 7), ([640, 360], 12), ([100, 1000], 5), ([64, 64], 64)] {
+            let mut seen = vec![0; (size[0] * size[1]) as usize];
+            for number in 0..parts {
+                let part = Region::part(number, parts, size).unwrap();
+                for y in part.low[1]..part.high[1] {
+                    for x in part.low[0]..part.high[0] {
+                        seen[(y * size[0] + x) as usize] += 1;
+                    }
+                }
+            }
+            assert!(seen.iter().all(|n| *n == 1), "{size:?} in {parts}");
+        }
+        assert_eq!(Region::part(0, 4, [200, 100]).unwrap().size(), [96, 48]);
+        assert!((0..8).any(|i| Region::part(i, 8, [8, 8]).is_none()), "there is but one tile");
     }
 }

@@ -12,7 +12,7 @@
 //! | `L_{l,h}` | `E S* D S+ D ..` | LORES: the gather ray goes on through mirrors and glass |
 //! | `L_{l,c}` | `E S* D S+ L` | LORES: emission met after at least one highly directional event |
 //!
-//! Light that passes straight through panes counts as direct (`L_{l,s}`): shadow rays take the panes' transmittance.
+//! L is a light source or the environment. Light that passes straight through panes counts as direct (`L_{l,s}`): shadow rays take the panes' transmittance.
 
 use std::f32::consts::FRAC_1_PI;
 use std::time::{Duration, Instant};
@@ -170,11 +170,15 @@ pub struct PassTimes {
 }
 
 impl PassTimes {
+    /// Share of HIRES, 0..=1.
+    pub fn hires_share(self) -> f64 {
+        let sum = (self.hires + self.lores).as_secs_f64();
+        if sum > 0.0 { self.hires.as_secs_f64() / sum } else { 0.0 }
+    }
+
     /// The same shares of another total.
     pub fn scaled_to(self, total: Duration) -> PassTimes {
-        let sum = (self.hires + self.lores).as_secs_f64();
-        let share = if sum > 0.0 { self.hires.as_secs_f64() / sum } else { 0.0 };
-        let hires = total.mul_f64(share);
+        let hires = total.mul_f64(self.hires_share());
         PassTimes { hires, lores: total - hires }
     }
 }
@@ -360,6 +364,8 @@ impl<'a> World<'a> {
                 let path = &mut ws.paths[index as usize];
                 path.ray.t_near = path.near * (1.0 - SEAM);
                 ws.far.push(index);
+            } else {
+                self.escape(ws, index);
             }
         }
     }
@@ -380,8 +386,26 @@ impl<'a> World<'a> {
             let (index, hit) = (ws.far[k], ws.hits[k]);
             if hit.is_hit() {
                 self.meet_far(ws, &far, index, &hit, passes, capture);
+            } else {
+                self.escape(ws, index);
             }
         }
+    }
+
+    /// A ray left the scene. What it sees of the environment counts as emission that it meets.
+    fn escape(&self, ws: &mut Workspace, index: u32) {
+        let path = &ws.paths[index as usize];
+        let direction = path.ray.direction;
+        let share = match path.arrival {
+            Arrival::Sharp => 1.0,
+            Arrival::Soft => return,
+            Arrival::Glossy { pdf, position, normal } => {
+                pdf / (pdf + self.lights.pdf_outside(position, normal, direction))
+            }
+        };
+        let radiance = path.throughput * self.lights.outside(direction) * share;
+        let sum = if path.gathers { &mut ws.lores } else { &mut ws.hires };
+        sum[path.trial as usize] += radiance;
     }
 
     /// A gather ray met the simplified scene.

@@ -16,13 +16,15 @@ use std::time::{Duration, Instant};
 use rayon::prelude::*;
 
 pub use cache::IrradianceCache;
-pub use film::Film;
+use film::Tile;
+pub use film::{Film, Region};
 use integrator::{Batch, Workspace};
 pub use integrator::{FarField, PassTimes, RayCounts, World};
 pub use nearness::Nearness;
 use path::Passes;
 use plan::Allocation;
 
+use crate::clock::Stopwatch;
 use crate::progress::Progress;
 use crate::sampling::hash_all;
 use crate::scene::Camera;
@@ -40,6 +42,8 @@ pub struct RenderParams {
     pub width: u32,
     /// Height in pixels.
     pub height: u32,
+    /// The part of the image to render; `None` for all of it. Pixels have the same bits as in the whole image.
+    pub region: Option<Region>,
     /// Fewest trials of a pixel in each pass.
     pub min_trials: u32,
     /// Most trials of a pixel in each pass; equal to `min_trials` for fixed sampling.
@@ -58,6 +62,18 @@ pub struct RenderParams {
     pub seed: u32,
 }
 
+impl RenderParams {
+    /// The part of the image that is rendered.
+    pub fn region(&self) -> Region {
+        self.region.unwrap_or(Region::whole([self.width, self.height]))
+    }
+
+    /// An empty film of that part.
+    pub fn film(&self) -> Film {
+        Film::of(self.region(), [self.width, self.height])
+    }
+}
+
 /// What came out.
 #[derive(Clone, Debug)]
 pub struct Rendering {
@@ -67,10 +83,47 @@ pub struct Rendering {
     pub rays: RayCounts,
     /// Wall-clock time of both passes, shared out by the time that threads spent in them; the pilot is in both.
     pub times: PassTimes,
+    /// The same for the time of all cores together.
+    pub cpu_times: PassTimes,
     /// Whether it was stopped before all planned trials were done.
     pub stopped: bool,
     /// What indirect light was interpolated from.
     pub cache: Option<IrradianceCache>,
+}
+
+/// What [`render_rounds`] shows after each round.
+#[derive(Clone, Copy, Debug)]
+pub struct Round<'a> {
+    /// The image so far.
+    pub film: &'a Film,
+    /// Trials of each pixel and pass in it.
+    pub trials: u32,
+    /// Rays traced so far.
+    pub rays: RayCounts,
+    /// Time that threads spent in the passes so far.
+    pub times: PassTimes,
+}
+
+/// Renders with the same number of trials for every pixel in rounds that double it, from `min_trials` to `max_trials`, and shows
+/// `watch` the image after each; it says whether to go on. The image after `n` trials is the one that [`render()`] makes with fixed
+/// sampling of `n`, so one run gives the whole curve of error against time.
+pub fn render_rounds(
+    world: &World<'_>,
+    camera: &Camera,
+    params: &RenderParams,
+    progress: &Progress,
+    watch: &mut dyn FnMut(&Round<'_>) -> bool,
+) {
+    let over = || progress.stopped();
+    let cache = irradiance_cache(world, camera, params, progress, &over);
+    let world = &World { cache: cache.as_ref(), ..*world };
+    let mut renderer = Renderer::new(world, camera, params);
+    let mut film = params.film();
+    let plan = renderer.everywhere(film.tiles.len(), params.max_trials);
+    let bar =
+        progress.stage("rendering", u64::from(params.max_trials) * u64::from(params.width) * u64::from(params.height));
+    renderer.rounds(&mut film, &plan, &over, &|n| bar.inc(n), watch);
+    bar.finish_and_clear();
 }
 
 /// Renders an image.
@@ -78,43 +131,59 @@ pub struct Rendering {
 /// A pilot estimates the variance around each tile and decides how many trials each pass gets there; its trials are thrown
 /// away. Deciding on trials that are kept would bias the image towards dark (see `docs/method.md`).
 pub fn render(world: &World<'_>, camera: &Camera, params: &RenderParams, progress: &Progress) -> Rendering {
-    let start = Instant::now();
-    let deadline = params.time_limit.map(|limit| start + limit);
+    let start = Stopwatch::start();
+    let deadline = params.time_limit.map(|limit| Instant::now() + limit);
     let over = || progress.stopped() || deadline.is_some_and(|d| Instant::now() >= d);
-    let interpolate = params.interpolate && world.far.is_some_and(|far| far.r_thresh > 0.0 && far.r_thresh.is_finite());
-    let stage = progress.stage("irradiance cache", 0);
-    let cache = interpolate.then(|| IrradianceCache::new(world, camera, [params.width, params.height], params.seed));
-    stage.finish_and_clear();
-    let filled = start.elapsed();
+    let cache = irradiance_cache(world, camera, params, progress, &over);
+    let filled = start.spent();
     let world = &World { cache: cache.as_ref(), ..*world };
-    let mut renderer = Renderer { world, camera, params, rays: RayCounts::default(), times: PassTimes::default() };
+    let mut renderer = Renderer::new(world, camera, params);
 
-    let mut film = Film::new(params.width, params.height);
+    let mut film = params.film();
     let plan = if params.min_trials == params.max_trials {
-        vec![Allocation { hires: params.min_trials, lores: params.min_trials }; film.tiles.len()]
+        renderer.everywhere(film.tiles.len(), params.min_trials)
     } else {
-        let mut pilot = Film::new(params.width, params.height);
+        let mut pilot = plan::pilot_tiles(params.region(), params);
         let trials = plan::pilot_trials(params);
-        let all = vec![Allocation { hires: trials, lores: trials }; film.tiles.len()];
+        let all = renderer.everywhere(pilot.len(), trials);
         renderer.round(&mut pilot, &all, 0..trials, hash_all(&[params.seed, PILOT]), &over, &|_| {});
-        plan::allocate(&pilot, params)
+        plan::allocate(&pilot, &film, params)
     };
 
     let planned: u64 = plan.iter().zip(&film.tiles).map(|(a, t)| u64::from(a.most()) * t.pixels.len() as u64).sum();
     let bar = progress.stage("rendering", planned);
-    let most = plan.iter().map(Allocation::most).max().unwrap_or(0);
-    let mut done = 0;
-    let mut stopped = false;
-    // Rounds double, so that there is a whole image early and prefixes of the point sets stay well distributed.
-    while done < most && !stopped {
-        let next = (2 * done).max(params.min_trials.max(1)).min(most);
-        stopped = renderer.round(&mut film, &plan, done..next, params.seed, &over, &|n| bar.inc(n));
-        done = next;
-    }
+    let stopped = renderer.rounds(&mut film, &plan, &over, &|n| bar.inc(n), &mut |_| true);
     bar.finish_and_clear();
-    let mut times = renderer.times.scaled_to(start.elapsed() - filled);
-    times.lores += filled;
-    Rendering { film, rays: renderer.rays, times, stopped, cache }
+    let spent = start.spent();
+    let times = renderer.times.after_cache(spent.wall_duration(), filled.wall_duration());
+    let cpu_times = renderer.times.after_cache(spent.cpu_duration(), filled.cpu_duration());
+    Rendering { film, rays: renderer.rays, times, cpu_times, stopped, cache }
+}
+
+/// Places that indirect light is interpolated between, where that is wanted and there is a far field beyond a near one.
+fn irradiance_cache(
+    world: &World<'_>,
+    camera: &Camera,
+    params: &RenderParams,
+    progress: &Progress,
+    over: &(dyn Fn() -> bool + Sync),
+) -> Option<IrradianceCache> {
+    let two_fields = world.far.is_some_and(|far| far.r_thresh > 0.0 && far.r_thresh.is_finite());
+    let stage = progress.stage("irradiance cache", 0);
+    let size = [params.width, params.height];
+    let cache =
+        (params.interpolate && two_fields).then(|| IrradianceCache::new(world, camera, size, params.seed, over));
+    stage.finish_and_clear();
+    cache
+}
+
+impl PassTimes {
+    /// The same shares of `total`, less what filling the irradiance cache took: that is LORES.
+    fn after_cache(self, total: Duration, filled: Duration) -> PassTimes {
+        let mut times = self.scaled_to(total.saturating_sub(filled));
+        times.lores += filled;
+        times
+    }
 }
 
 struct Renderer<'a> {
@@ -125,11 +194,45 @@ struct Renderer<'a> {
     times: PassTimes,
 }
 
-impl Renderer<'_> {
+impl<'a> Renderer<'a> {
+    fn new(world: &'a World<'a>, camera: &'a Camera, params: &'a RenderParams) -> Self {
+        Renderer { world, camera, params, rays: RayCounts::default(), times: PassTimes::default() }
+    }
+
+    /// The plan that gives every pixel the same number of trials.
+    fn everywhere(&self, tiles: usize, trials: u32) -> Vec<Allocation> {
+        vec![Allocation { hires: trials, lores: trials }; tiles]
+    }
+
+    /// Carries out a plan in rounds. They double, so that there is a whole image early and prefixes of the point sets stay well
+    /// distributed. Returns whether it was cut short.
+    fn rounds(
+        &mut self,
+        film: &mut Film,
+        plan: &[Allocation],
+        over: &(dyn Fn() -> bool + Sync),
+        advance: &(dyn Fn(u64) + Sync),
+        watch: &mut dyn FnMut(&Round<'_>) -> bool,
+    ) -> bool {
+        let most = plan.iter().map(Allocation::most).max().unwrap_or(0);
+        let mut done = 0;
+        while done < most {
+            let next = (2 * done).max(self.params.min_trials.max(1)).min(most);
+            if self.round(&mut film.tiles, plan, done..next, self.params.seed, over, advance) {
+                return true;
+            }
+            done = next;
+            if !watch(&Round { film, trials: done, rays: self.rays, times: self.times }) {
+                break;
+            }
+        }
+        false
+    }
+
     /// Adds the trials with numbers in `range` to every tile whose allocation has them. Returns whether it was cut short.
     fn round(
         &mut self,
-        film: &mut Film,
+        tiles: &mut [Tile],
         plan: &[Allocation],
         range: std::ops::Range<u32>,
         seed: u32,
@@ -138,7 +241,7 @@ impl Renderer<'_> {
     ) -> bool {
         let size = [self.params.width, self.params.height];
         let (world, camera, features) = (self.world, self.camera, self.params.features);
-        let work = film.tiles.par_iter_mut().zip(plan).map_init(Workspace::default, |ws, (tile, allocation)| {
+        let work = tiles.par_iter_mut().zip(plan).map_init(Workspace::default, |ws, (tile, allocation)| {
             (ws.counts, ws.times) = Default::default();
             let mut cut = false;
             for (trials, passes) in allocation.segments(range.clone()) {

@@ -1,20 +1,23 @@
 //! A radiosity solution shown directly: what the camera sees of patches, without any gather.
 
+use std::time::Duration;
+
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::RenderParams;
-use super::film::Film;
-use super::integrator::{FarField, World};
+use super::integrator::{FarField, PassTimes, RayCounts, World};
 use super::view::ViewRays;
+use super::{RenderParams, Rendering};
 use crate::backend::{Coherence, Hit, Ray, Visible};
+use crate::clock::Stopwatch;
 use crate::scene::Camera;
 use crate::shading::{Bsdf, Lobes, SurfacePoint};
 use crate::simplify::TriangleSource;
 
 /// Renders radiosity plus emission of the first surface of `far`, `min_trials` rays a pixel; everything goes to HIRES.
-pub fn show_radiosity(world: &World<'_>, far: &FarField<'_>, camera: &Camera, params: &RenderParams) -> Film {
-    let mut film = Film::new(params.width, params.height);
+pub fn show_radiosity(world: &World<'_>, far: &FarField<'_>, camera: &Camera, params: &RenderParams) -> Rendering {
+    let start = Stopwatch::start();
+    let mut film = params.film();
     let view = ViewRays::new(camera, [params.width, params.height], params.seed);
     film.tiles.par_iter_mut().for_each(|tile| {
         let n = params.min_trials.max(1);
@@ -29,12 +32,22 @@ pub fn show_radiosity(world: &World<'_>, far: &FarField<'_>, camera: &Camera, pa
             tile.pixels[pixel].hires.add(radiance(world, far, ray, hit), trial & 1 == 0);
         }
     });
-    film
+    let spent = start.spent();
+    let all_hires = |total| PassTimes { hires: total, lores: Duration::ZERO };
+    let view = film.pixels().map(|p| u64::from(p.hires.trials())).sum();
+    Rendering {
+        film,
+        rays: RayCounts { view, ..RayCounts::default() },
+        times: all_hires(spent.wall_duration()),
+        cpu_times: all_hires(spent.cpu_duration()),
+        stopped: false,
+        cache: None,
+    }
 }
 
 fn radiance(world: &World<'_>, far: &FarField<'_>, ray: &Ray, hit: &Hit) -> Vec3 {
     if !hit.is_hit() {
-        return Vec3::ZERO;
+        return world.lights.outside(ray.direction);
     }
     let reflected = far.reflected(hit, ray.direction);
     match far.geometry.sources[hit.triangle as usize] {

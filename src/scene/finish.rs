@@ -38,6 +38,7 @@ pub(super) fn finish(mut builder: SceneBuilder) -> Result<Scene> {
         cameras.push(overview::camera(&mesh));
     }
     Ok(Scene {
+        environment: None,
         name: builder.name,
         mesh,
         materials: builder.materials,

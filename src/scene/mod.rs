@@ -6,6 +6,7 @@ pub mod appearance;
 pub mod builder;
 pub mod camera;
 mod clean;
+pub mod environment;
 mod finish;
 pub mod gltf;
 pub mod light;
@@ -14,9 +15,12 @@ pub mod mesh;
 mod overview;
 mod pane;
 pub mod plane;
+pub mod sky;
 #[cfg(test)]
 mod tests;
 pub mod texture;
+
+use std::sync::Arc;
 
 use glam::DVec3;
 
@@ -24,6 +28,7 @@ pub use aabb::Aabb;
 pub use alpha::AlphaFilter;
 pub use builder::{GeometryId, MeshData, SceneBuilder};
 pub use camera::{Camera, Lens, Projection};
+pub use environment::{Environment, SunDisk};
 pub use gltf::{LoadOptions, load};
 pub use light::{LightKind, PunctualLight};
 pub use material::{Alpha, Material, TextureSlot};
@@ -44,6 +49,8 @@ pub struct Scene {
     pub textures: Vec<Texture>,
     /// Point, spot and directional lights.
     pub lights: Vec<PunctualLight>,
+    /// What lies around it; `None` is black.
+    pub environment: Option<Arc<Environment>>,
     /// Cameras; an importer adds one that sees the scene where the file has none.
     pub cameras: Vec<Camera>,
     /// What was subtracted from file coordinates, so that the scene's centre is the origin.

@@ -338,6 +338,7 @@ pub fn prepare(scene: &Arc<Scene>, settings: Settings) -> gsii::Result<Prepared>
 
 pub fn image(prepared: &Prepared, camera: &Camera, size: [u32; 2], trials: u32, seed: u32) -> Film {
     let params = RenderParams {
+        region: None,
         width: size[0],
         height: size[1],
         min_trials: trials,

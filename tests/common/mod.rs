@@ -8,7 +8,7 @@ use std::sync::Arc;
 use base64::Engine;
 use gsii::pipeline::{Prepared, Settings, Stats, choose_camera};
 use gsii::progress::Progress;
-use gsii::render::{self, Film, RenderParams, Rendering};
+use gsii::render::{Film, RenderParams, Rendering};
 use gsii::scene::{LoadOptions, Scene, load};
 use serde_json::{Value, json};
 use statrs::distribution::{ContinuousCDF, Normal};
@@ -118,6 +118,7 @@ pub fn fixed(width: u32, height: u32, trials: u32, seed: u32) -> RenderParams {
     RenderParams {
         width,
         height,
+        region: None,
         min_trials: trials,
         max_trials: trials,
         interpolate: false,
@@ -127,6 +128,11 @@ pub fn fixed(width: u32, height: u32, trials: u32, seed: u32) -> RenderParams {
         features: false,
         seed,
     }
+}
+
+/// As [`fixed`], with indirect light interpolated.
+pub fn interpolated(width: u32, height: u32, trials: u32, seed: u32) -> RenderParams {
+    RenderParams { interpolate: true, ..fixed(width, height, trials, seed) }
 }
 
 /// Everything before the first pixel, seen from the first camera.
@@ -139,7 +145,7 @@ pub fn prepare(scene: &Arc<Scene>, settings: Settings) -> (Prepared, Stats) {
 
 /// Renders from the first camera.
 pub fn render(prepared: &Prepared, params: &RenderParams) -> Rendering {
-    render::render(&prepared.world(), &prepared.scene.cameras[0], params, &Progress::silent())
+    prepared.render(&prepared.scene.cameras[0], params, &Progress::silent())
 }
 
 /// Radiance of every pixel and band.

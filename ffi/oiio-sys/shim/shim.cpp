@@ -20,7 +20,7 @@
 
 // The Rust side declares these by hand.
 static_assert(sizeof(void*) != 8
-                  || (sizeof(GsiiInfo) == 36 && sizeof(GsiiAttribute) == 32 && sizeof(GsiiImage) == 72),
+                  || (sizeof(GsiiInfo) == 36 && sizeof(GsiiAttribute) == 32 && sizeof(GsiiImage) == 80),
               "keep src/lib.rs in step");
 
 using namespace OIIO;
@@ -267,6 +267,8 @@ int gsii_oiio_write(const GsiiImage* image, char* error, size_t error_size)
             }
         }
         spec.attribute("oiio:ColorSpace", image->values_are == GSII_U8 ? "sRGB" : linear_rec709);
+        if (image->tile > 0 && output->supports("tiles"))
+            spec.tile_width = spec.tile_height = image->tile;
         if (image->compression)
             spec.attribute("compression", string_view(image->compression));
 

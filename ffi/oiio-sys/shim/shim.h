@@ -45,6 +45,8 @@ struct GsiiImage {
     size_t attribute_count;
     int32_t width, height, channels;
     int32_t values_are;          // GSII_U8 or GSII_F32
+    int32_t tile;                // edge of square tiles where the format has them, 0 for rows
+    int32_t reserved;
 };
 
 // Version that the shim was compiled with, and that of the library that is loaded: 10000 major + 100 minor + patch.

@@ -60,11 +60,13 @@ pub struct GsiiImage {
     pub height: i32,
     pub channels: i32,
     pub values_are: i32,
+    pub tile: i32,
+    pub reserved: i32,
 }
 
 // The same sizes are asserted in shim.cpp.
 #[cfg(target_pointer_width = "64")]
-const _: () = assert!(size_of::<GsiiInfo>() == 36 && size_of::<GsiiAttribute>() == 32 && size_of::<GsiiImage>() == 72);
+const _: () = assert!(size_of::<GsiiInfo>() == 36 && size_of::<GsiiAttribute>() == 32 && size_of::<GsiiImage>() == 80);
 
 unsafe extern "C" {
     pub fn gsii_oiio_compiled_version() -> c_int;

@@ -142,7 +142,7 @@ fn density_integrates_to_probability() {
     let lights = Lights::new(&scene);
     for i in 0..20 {
         let position = 4.0 * random_point(80, i);
-        let to_finite = lights.probability_of_finite(position, Vec3::ZERO).unwrap();
+        let to_finite = lights.kinds(position, Vec3::ZERO).unwrap().finite;
         for (l, light) in lights.areas.lights.iter().enumerate() {
             let probability = to_finite * lights.tree.probability(position, Vec3::ZERO, l as u32);
             let side = (position.as_dvec3() - light.first_corner()).dot(light.normal());

@@ -4,6 +4,7 @@
 mod area;
 mod choice;
 mod emission;
+mod environment;
 mod punctual;
 
 use glam::{DVec3, Mat3, Vec3};

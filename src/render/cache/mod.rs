@@ -18,19 +18,31 @@ use crate::backend::Ray;
 use crate::sampling::{hash_all, sobol};
 use crate::scene::Camera;
 use index::Index;
-use record::{RAYS, Record};
+use record::{Record, Strata};
 
-/// Distances in pixels of the places that are looked at, pass after pass.
-const SPACINGS: [u32; 4] = [16, 8, 4, 2];
+/// Pass after pass: the distance in pixels of the places that are looked at, and the rays of a record. Records that are close
+/// together share their noise.
+const PASSES: [(u32, Strata); 4] = [
+    (16, Strata { rings: 16, sectors: 48 }),
+    (8, Strata { rings: 12, sectors: 36 }),
+    (4, Strata { rings: 10, sectors: 30 }),
+    (2, Strata { rings: 8, sectors: 24 }),
+];
 
 /// A place that has less weight of records than this gets one of its own.
 const COVERED: f32 = 0.4;
 
 /// Reach of a record as a share of its harmonic mean distance.
-const ACCURACY: f32 = 0.25;
+const ACCURACY: f32 = 0.3;
+
+/// Records refuse that had to be given more than this many times the reach that their distances allow, as a share.
+const TOO_SMALL: f32 = 0.25;
+
+/// Relative difference from what the others say at which a record refuses.
+const TOLERANCE: f32 = 0.2;
 
 /// Least reach in pixels.
-const LEAST_PIXELS: f32 = 1.5;
+const LEAST_PIXELS: f32 = 3.0;
 
 /// Keeps the cache's random numbers apart from the image's.
 const STREAM: u32 = 0x6361_6368;
@@ -43,23 +55,34 @@ pub struct IrradianceCache {
 }
 
 impl IrradianceCache {
-    /// Fills a cache for one view. The same on any number of threads.
-    pub fn new(world: &World<'_>, camera: &Camera, size: [u32; 2], seed: u32) -> Self {
+    /// Fills a cache for one view. The same on any number of threads, unless `over` says that it must end.
+    pub fn new(
+        world: &World<'_>,
+        camera: &Camera,
+        size: [u32; 2],
+        seed: u32,
+        over: &(dyn Fn() -> bool + Sync),
+    ) -> Self {
         let Some(far) = &world.far else { return IrradianceCache::default() };
         let view = ViewRays::new(camera, size, hash_all(&[seed, STREAM]));
         let mut cache = IrradianceCache::default();
-        for (pass, spacing) in SPACINGS.into_iter().enumerate() {
+        for (pass, (spacing, strata)) in PASSES.into_iter().enumerate() {
             let places = cache.places(world, &view, size, spacing, pass as u32);
             let fresh: Vec<Option<Record>> = places
                 .par_iter()
                 .enumerate()
                 .map_init(Workspace::default, |ws, (number, place)| {
-                    gather(world, far, ws, place, hash_all(&[seed, STREAM, pass as u32, number as u32]))
+                    let stream = hash_all(&[seed, STREAM, pass as u32, number as u32]);
+                    if over() { None } else { gather(world, far, ws, place, strata, stream) }
                 })
                 .collect();
             cache.records.extend(fresh.into_iter().flatten());
             cache.settle(far.r_thresh);
+            log::debug!("irradiance cache: {} places at every {spacing} pixels, {} records", places.len(), cache.len());
         }
+        cache.check();
+        let refuse = cache.records.iter().filter(|r| r.refuses).count();
+        log::debug!("irradiance cache: {refuse} of {} records refuse", cache.len());
         cache
     }
 
@@ -111,6 +134,7 @@ impl IrradianceCache {
             .collect();
         for (place, distance) in clamped.into_iter().enumerate() {
             let record = &mut self.records[order[place]];
+            record.refuses = ACCURACY * distance < TOO_SMALL * record.least_reach;
             record.reach = (ACCURACY * distance).max(record.least_reach);
         }
         self.index = Index::new(&self.records);
@@ -135,14 +159,38 @@ impl IrradianceCache {
         self.records.is_empty()
     }
 
-    /// Irradiance over pi at a point with shading normal `normal`; `None` where no record reaches.
+    /// Irradiance over pi at a point with shading normal `normal`; `None` where no record reaches, or most refuse.
     pub fn look_up(&self, position: Vec3, normal: Vec3) -> Option<Vec3> {
-        let (mut sum, mut weights) = (Vec3::ZERO, 0.0);
+        let (mut sum, mut weights, mut refused) = (Vec3::ZERO, 0.0, 0.0);
         for (weight, record) in self.around(position, normal) {
-            sum += weight * record.at(position, normal);
-            weights += weight;
+            if record.refuses {
+                refused += weight;
+            } else {
+                sum += weight * record.at(position, normal);
+                weights += weight;
+            }
         }
-        (weights > 0.0).then(|| sum / weights)
+        (weights > refused).then(|| sum / weights)
+    }
+
+    /// Asks the others what each record measured itself. Records that are told something else refuse.
+    fn check(&mut self) {
+        let refuses: Vec<bool> = (0..self.records.len())
+            .into_par_iter()
+            .map(|number| {
+                let own = &self.records[number];
+                let (mut sum, mut weights) = (Vec3::ZERO, 0.0);
+                for (weight, other) in self.around(own.position, own.normal).filter(|(_, o)| !std::ptr::eq(*o, own)) {
+                    sum += weight * other.at(own.position, own.normal);
+                    weights += weight;
+                }
+                let (told, measured) = ((sum / weights).element_sum(), own.radiance.element_sum());
+                weights > 0.0 && (told - measured).abs() > TOLERANCE * told.max(measured)
+            })
+            .collect();
+        for (record, refuses) in self.records.iter_mut().zip(refuses) {
+            record.refuses |= refuses;
+        }
     }
 }
 
@@ -150,16 +198,23 @@ impl IrradianceCache {
 #[derive(Clone)]
 struct Place {
     captured: Captured,
-    /// Width of a pixel there, scene units.
+    /// Width of a pixel there, along the surface, scene units.
     footprint: f32,
 }
 
 /// Gathers the light of one place.
-fn gather(world: &World<'_>, far: &FarField<'_>, ws: &mut Workspace, place: &Place, stream: u32) -> Option<Record> {
+fn gather(
+    world: &World<'_>,
+    far: &FarField<'_>,
+    ws: &mut Workspace,
+    place: &Place,
+    strata: Strata,
+    stream: u32,
+) -> Option<Record> {
     let Captured { point, normal, .. } = &place.captured;
-    let paths: Vec<Path> = (0..RAYS)
+    let paths: Vec<Path> = (0..strata.len())
         .map(|k| {
-            let direction = record::direction(*normal, k, stream);
+            let direction = strata.direction(*normal, k, stream);
             let [.., u, _] = sobol(k as u32, 0, stream);
             Path {
                 near: far.r_thresh * (0.5 + u),
@@ -170,6 +225,6 @@ fn gather(world: &World<'_>, far: &FarField<'_>, ws: &mut Workspace, place: &Pla
             }
         })
         .collect();
-    let (radiance, distances) = world.gather_with_distances(ws, &paths, RAYS);
-    Record::new(point.position, *normal, LEAST_PIXELS * place.footprint, radiance, distances)
+    let (radiance, distances) = world.gather_with_distances(ws, &paths, strata.len());
+    Record::new(point.position, *normal, LEAST_PIXELS * place.footprint, strata, radiance, distances)
 }

@@ -6,15 +6,36 @@ use glam::{Mat3, Vec3};
 
 use crate::sampling::{basis, sobol};
 
-/// Strata of the hemisphere: rings of equal projected solid angle, and sectors.
-pub(super) const RINGS: usize = 16;
-/// See [`RINGS`].
-pub(super) const SECTORS: usize = 48;
-/// Gather rays of one record.
-pub(super) const RAYS: usize = RINGS * SECTORS;
+/// Strata of the hemisphere: rings of equal projected solid angle, cut into sectors.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Strata {
+    pub rings: usize,
+    pub sectors: usize,
+}
+
+impl Strata {
+    /// Number of strata, and of rays.
+    pub fn len(self) -> usize {
+        self.rings * self.sectors
+    }
+
+    /// The direction of ray `k` (ring by ring) of the record of `stream` around `normal`, cosine-distributed in its stratum.
+    pub fn direction(self, normal: Vec3, k: usize, stream: u32) -> Vec3 {
+        let u = sobol(k as u32, 0, stream);
+        let (ring, sector) = (k / self.sectors, k % self.sectors);
+        let sin2 = (ring as f32 + u[0]) / self.rings as f32;
+        let phi = TAU * (sector as f32 + u[1]) / self.sectors as f32;
+        let (sin, cos) = phi.sin_cos();
+        let radius = sin2.sqrt();
+        basis(normal) * Vec3::new(radius * cos, radius * sin, (1.0 - sin2).max(0.0).sqrt())
+    }
+}
 
 /// Largest angle between normals over which a record is used: 20 degrees, as the cosine.
 const LEAST_COSINE: f32 = 0.939_692_6;
+
+/// Largest change that gradients may make, as a share of the record's own light.
+const MOST_CHANGE: f32 = 0.5;
 
 /// A point may lie this far in front of a record's tangent plane, as a share of the record's reach, before the record is taken to
 /// see what the point does not (Ward 1988, section 2.2).
@@ -32,6 +53,8 @@ pub(super) struct Record {
     pub reach: f32,
     /// What [`Record::reach`] may not fall below.
     pub least_reach: f32,
+    /// Whether light changes too fast around here to be interpolated: the record only says so.
+    pub refuses: bool,
     /// Irradiance over pi: the radiance that a white diffuse surface reflects, W/(sr m^2).
     pub radiance: Vec3,
     /// Change of each band with the normal: scalar product with the axis of rotation times its sine.
@@ -40,49 +63,53 @@ pub(super) struct Record {
     by_translation: [Vec3; 3],
 }
 
-/// The direction of ray `k` (ring by ring) of the record of `stream` around `normal`, cosine-distributed in its stratum.
-pub(super) fn direction(normal: Vec3, k: usize, stream: u32) -> Vec3 {
-    let u = sobol(k as u32, 0, stream);
-    let (ring, sector) = (k / SECTORS, k % SECTORS);
-    let sin2 = (ring as f32 + u[0]) / RINGS as f32;
-    let phi = TAU * (sector as f32 + u[1]) / SECTORS as f32;
-    let (sin, cos) = phi.sin_cos();
-    let radius = sin2.sqrt();
-    basis(normal) * Vec3::new(radius * cos, radius * sin, (1.0 - sin2).max(0.0).sqrt())
-}
-
 impl Record {
-    /// From the radiance that each ray of [`direction`] brings, and the distance of what it meets (infinite where nothing).
+    /// From the radiance that each ray of [`Strata::direction`] brings, and the distance of what it meets (infinite where nothing).
     /// `None` when something is not finite.
     ///
     /// Gradients after Ward and Heckbert, "Irradiance gradients" (1992), for strata of equal projected solid angle.
-    pub fn new(position: Vec3, normal: Vec3, least_reach: f32, radiance: &[Vec3], distances: &[f32]) -> Option<Self> {
+    pub fn new(
+        position: Vec3,
+        normal: Vec3,
+        least_reach: f32,
+        strata: Strata,
+        radiance: &[Vec3],
+        distances: &[f32],
+    ) -> Option<Self> {
+        let (Strata { rings, sectors }, rays) = (strata, strata.len());
         let sum: Vec3 = radiance.iter().sum();
         let inverse: f64 = distances.iter().map(|&d| 1.0 / f64::from(d.max(f32::MIN_POSITIVE))).sum();
-        let mean = sum / RAYS as f32;
-        let distance = (RAYS as f64 / inverse) as f32;
-        let at = |ring: usize, sector: usize| ring * SECTORS + sector % SECTORS;
+        let mean = sum / rays as f32;
+        let distance = (rays as f64 / inverse) as f32;
+        let at = |ring: usize, sector: usize| ring * sectors + sector % sectors;
         let closest = |a: usize, b: usize| distances[a].min(distances[b]);
-        let boundary = |ring: usize| (ring as f32 / RINGS as f32).sqrt();
+        let boundary = |ring: usize| (ring as f32 / rings as f32).sqrt();
         // Columns: change of one band along the frame's axes
         let (mut rotation, mut translation) = (Mat3::ZERO, Mat3::ZERO);
         let outer = |axis: Vec3, value: Vec3| Mat3::from_cols(axis * value.x, axis * value.y, axis * value.z);
-        for sector in 0..SECTORS {
-            let angle = |s: f32| TAU * s / SECTORS as f32;
+        // Mean over each ring of the tangent of the angle with the normal: at the horizon its value in the middle is far off.
+        let tangents: Vec<f32> = (0..rings)
+            .map(|ring| {
+                let primitive = |s: f32| s.asin() - s * (1.0 - s * s).max(0.0).sqrt();
+                (primitive(boundary(ring + 1)) - primitive(boundary(ring))) * rings as f32
+            })
+            .collect();
+        for sector in 0..sectors {
+            let angle = |s: f32| TAU * s / sectors as f32;
             let (sin, cos) = angle(sector as f32 + 0.5).sin_cos();
             let (outward, around) = (Vec3::new(cos, sin, 0.0), Vec3::new(-sin, cos, 0.0));
             let (sin, cos) = angle(sector as f32).sin_cos();
             let around_before = Vec3::new(-sin, cos, 0.0);
-            let before = sector + SECTORS - 1;
-            for ring in 0..RINGS {
+            let before = sector + sectors - 1;
+            for ring in 0..rings {
                 let here = radiance[at(ring, sector)];
-                let sin2 = (ring as f32 + 0.5) / RINGS as f32;
+                let sin2 = (ring as f32 + 0.5) / rings as f32;
                 let (sin, cos) = (sin2.sqrt(), (1.0 - sin2).sqrt());
-                rotation -= outer(around, here * (sin / cos));
+                rotation += outer(around, here * tangents[ring]);
                 if ring > 0 {
                     let s = boundary(ring);
                     let d = closest(at(ring, sector), at(ring - 1, sector));
-                    let weight = TAU / SECTORS as f32 * s * (1.0 - s * s) / d;
+                    let weight = TAU / sectors as f32 * s * (1.0 - s * s) / d;
                     translation += outer(outward, (here - radiance[at(ring - 1, sector)]) * weight);
                 }
                 let cosine = |ring: usize| (1.0 - boundary(ring) * boundary(ring)).max(0.0).sqrt();
@@ -93,7 +120,7 @@ impl Record {
         }
         let frame = basis(normal);
         let columns = |m: Mat3, scale: f32| [m.x_axis, m.y_axis, m.z_axis].map(|g| frame * g * scale);
-        let by_rotation = columns(rotation, 1.0 / RAYS as f32);
+        let by_rotation = columns(rotation, 1.0 / rays as f32);
         let by_translation = columns(translation, FRAC_1_PI);
         let finite =
             mean.is_finite() && by_rotation.iter().chain(&by_translation).all(|g| g.is_finite()) && distance > 0.0;
@@ -103,6 +130,7 @@ impl Record {
             distance,
             reach: least_reach,
             least_reach,
+            refuses: false,
             radiance: mean,
             by_rotation,
             by_translation,
@@ -132,7 +160,10 @@ impl Record {
     pub fn at(&self, position: Vec3, normal: Vec3) -> Vec3 {
         let (axis, offset) = (self.normal.cross(normal), position - self.position);
         let change = |band: usize| axis.dot(self.by_rotation[band]) + offset.dot(self.by_translation[band]);
-        (self.radiance + Vec3::new(change(0), change(1), change(2))).max(Vec3::ZERO)
+        // Next to edges gradients are large and hold only for a short way.
+        let change = Vec3::new(change(0), change(1), change(2));
+        let limit = MOST_CHANGE * self.radiance;
+        self.radiance + change.clamp(-limit, limit)
     }
 }
 
@@ -142,13 +173,14 @@ mod tests {
 
     /// A record at `position` in a world where a ray brings what `radiance` says of its origin and direction, from a distance.
     fn record(position: Vec3, normal: Vec3, stream: u32, world: &dyn Fn(Vec3, Vec3) -> (f32, f32)) -> Record {
-        let (radiance, distances): (Vec<Vec3>, Vec<f32>) = (0..RAYS)
+        let strata = Strata { rings: 16, sectors: 48 };
+        let (radiance, distances): (Vec<Vec3>, Vec<f32>) = (0..strata.len())
             .map(|k| {
-                let (l, d) = world(position, direction(normal, k, stream));
+                let (l, d) = world(position, strata.direction(normal, k, stream));
                 (Vec3::splat(l), d)
             })
             .unzip();
-        Record::new(position, normal, 0.1, &radiance, &distances).unwrap()
+        Record::new(position, normal, 0.1, strata, &radiance, &distances).unwrap()
     }
 
     /// Light that depends on the direction only: `L = 1 + x` gives `E / pi = 1 + 2/3 n_x`.

@@ -1,0 +1,238 @@
+//! One run: preparation, and images with more and more trials, each compared with the reference.
+
+use std::path::Path;
+
+use super::error::{Errors, Picture, compare};
+use super::plan::{PAPER_PATCHES, Patches, Run, Sampling};
+use super::record::{Point, Preparation, Record, Store};
+use super::reference::Reference;
+use super::subject::Subject;
+use crate::clock::{Spent, Stopwatch};
+use crate::error::Result;
+use crate::image::{self, Metadata, WriteOptions};
+use crate::pipeline::{Prepared, Settings, Stats, simplify_only};
+use crate::progress::Progress;
+use crate::radiosity;
+use crate::render::film::PixelSum;
+use crate::render::{Film, RayCounts, RenderParams};
+use crate::simplify::{Class, SimplifiedGeometry};
+
+/// Keeps the images apart from the default seed's, which everybody looks at.
+const SEED: u32 = 1993;
+
+/// A scene, prepared for a run: kept for the next one, which may differ in its trials only.
+pub struct Kit {
+    /// Names what it is prepared for.
+    key: String,
+    prepared: Prepared,
+    stats: Stats,
+    all: Spent,
+}
+
+impl Kit {
+    fn new(key: String, run: &Run, subject: &Subject, progress: &Progress) -> Result<Kit> {
+        let settings = with_patches(run, subject, progress)?;
+        let mut stats = Stats::new();
+        let watch = Stopwatch::start();
+        let prepared = Prepared::new(subject.scene.clone(), &subject.camera, settings, progress, &mut stats)?;
+        let all = watch.spent();
+        for warning in &stats.warnings {
+            log::info!("{}, {}: {warning}", subject.name, run.label);
+        }
+        Ok(Kit { key, prepared, stats, all })
+    }
+}
+
+/// Carries a run out. `None` when it was stopped before it was finished. `kit` is what the run before was prepared with, and what
+/// this one is.
+///
+/// # Errors
+/// As preparing a scene; images that cannot be written.
+pub fn perform(
+    run: &Run,
+    subject: &Subject,
+    reference: Option<&Reference>,
+    store: &Store,
+    kit: &mut Option<Kit>,
+    progress: &Progress,
+) -> Result<Option<Record>> {
+    let preparation_key = run.preparation_key(subject);
+    // What was there is given up before its successor needs the memory.
+    let fitting = kit.take().filter(|kit| kit.key == preparation_key);
+    let Kit { prepared, stats, all, .. } = match fitting {
+        Some(fitting) => kit.insert(fitting),
+        None => kit.insert(Kit::new(preparation_key, run, subject, progress)?),
+    };
+    let key = run.key(subject, reference.map_or(0, |r| r.trials));
+    let mut parameters = stats.parameters.clone();
+    parameters.insert("pixels".to_owned(), (subject.size[0] * subject.size[1]).into());
+    let mut record = Record {
+        key,
+        scene: subject.name.clone(),
+        role: run.role,
+        label: run.label.clone(),
+        parameters,
+        threads: rayon::current_num_threads(),
+        version: stats.version.to_owned(),
+        triangles: stats.counts.triangles,
+        preparation: preparation(prepared, stats, *all),
+        points: Vec::new(),
+    };
+    let keep = Keep { store, subject, reference: reference.map(|r| &r.picture) };
+    match run.sampling {
+        Sampling::Rounds { most, rel_mse } => {
+            let mut failed = None;
+            let mut watch = Stopwatch::start();
+            let mut rendering = Spent::default();
+            prepared.render_rounds(&subject.camera, &params(run, subject, 2, most, 0.0), progress, &mut |round| {
+                rendering += watch.spent();
+                let share = round.times.hires_share();
+                let result = keep.point(&record.key, round.film, rendering, share, round.rays);
+                let enough = match result {
+                    Ok(point) => {
+                        let enough = point.whole.is_some_and(|e| e.rel_mse < rel_mse);
+                        record.points.push(point);
+                        enough
+                    }
+                    Err(error) => {
+                        failed = Some(error);
+                        true
+                    }
+                };
+                watch = Stopwatch::start();
+                !enough && !progress.stopped()
+            });
+            if let Some(error) = failed {
+                return Err(error);
+            }
+        }
+        Sampling::Paper => {
+            let watch = Stopwatch::start();
+            let rendering = prepared.render(&subject.camera, &params(run, subject, 10, 30, 0.05), progress);
+            let share = rendering.times.hires_share();
+            record.points.push(keep.point(&record.key, &rendering.film, watch.spent(), share, rendering.rays)?);
+        }
+    }
+    Ok((!progress.stopped()).then_some(record))
+}
+
+fn params(run: &Run, subject: &Subject, min_trials: u32, max_trials: u32, error: f32) -> RenderParams {
+    RenderParams {
+        width: subject.size[0],
+        height: subject.size[1],
+        region: None,
+        min_trials,
+        max_trials,
+        hires_error: error,
+        lores_error: error,
+        time_limit: None,
+        features: false,
+        interpolate: run.interpolate,
+        seed: SEED,
+    }
+}
+
+/// The settings of a run, with the patch size that gives the paper's number of patches where that is wanted.
+fn with_patches(run: &Run, subject: &Subject, progress: &Progress) -> Result<Settings> {
+    let mut settings = run.settings.clone();
+    if run.patches == Patches::Auto {
+        return Ok(settings);
+    }
+    let complete = settings.complete_geometry();
+    let (simplified, filled) =
+        simplify_only(&subject.scene, &subject.camera, settings.clone(), progress, &mut Stats::new())?;
+    let geometry = if complete {
+        SimplifiedGeometry::complete(&subject.scene, &simplified.surface_of_triangle)
+    } else {
+        simplified.geometry
+    };
+    let clusters = if complete { &[][..] } else { &simplified.clusters };
+    let (paper_surfaces, paper_patches) = PAPER_PATCHES[usize::from(complete)];
+    let kept = |s: &crate::simplify::Surface| complete || s.class == Class::Normal;
+    let surfaces = simplified.surfaces.iter().filter(|s| kept(s)).count() + 6 * clusters.len();
+    let target = match run.patches {
+        Patches::PaperShare => (paper_patches as f64 / paper_surfaces as f64 * surfaces as f64) as usize,
+        _ => paper_patches,
+    };
+    let mut radiosity = filled.radiosity_params();
+    let mut bounds = [1e-3 * subject.length(), subject.length()];
+    // Fewer patches for larger sizes: 20 halvings of the range of logarithms.
+    for _ in 0..20 {
+        radiosity.patch_size = (bounds[0] * bounds[1]).sqrt();
+        let larger = radiosity::count_patches(&geometry, clusters, &radiosity)? > target;
+        bounds[usize::from(!larger)] = radiosity.patch_size;
+    }
+    settings.patch_size = Some(radiosity.patch_size);
+    Ok(settings)
+}
+
+fn preparation(prepared: &Prepared, stats: &Stats, all: Spent) -> Preparation {
+    let spent = |stage: fn(&crate::pipeline::stats::Seconds) -> f64| Spent {
+        wall: stage(&stats.seconds),
+        cpu: stage(&stats.cpu_seconds),
+    };
+    let c = &stats.counts;
+    Preparation {
+        all,
+        simplify: spent(|s| s.simplify),
+        build: spent(|s| s.build),
+        radiosity: spent(|s| s.radiosity),
+        surfaces: if prepared.settings.complete_geometry() { c.surfaces } else { c.normal + c.simple },
+        patches: c.patches,
+        clusters: if prepared.settings.complete_geometry() { 0 } else { c.clusters },
+        unshot: stats.ledger.map_or(0.0, |l| l.unshot_share()),
+        error: stats.error.radiosity,
+        rays: stats.rays.radiosity,
+    }
+}
+
+/// Where images go, and what they are compared with.
+struct Keep<'a> {
+    store: &'a Store,
+    subject: &'a Subject,
+    reference: Option<&'a Picture>,
+}
+
+impl Keep<'_> {
+    fn point(&self, key: &str, film: &Film, rendering: Spent, hires_share: f64, rays: RayCounts) -> Result<Point> {
+        let pixels = f64::from(film.width) * f64::from(film.height);
+        let trials = film.pixels().map(|p| f64::from(p.hires.trials().max(p.lores.trials()))).sum::<f64>() / pixels;
+        let mut point = Point {
+            trials,
+            rendering,
+            hires_share,
+            rays: rays.hires() + rays.lores(),
+            noise: film.relative_errors().total,
+            dev: [mean_dev(film, |p| &p.hires), mean_dev(film, |p| &p.lores)],
+            whole: None,
+            indirect: None,
+        };
+        if let (Some(reference), Some(picture)) = (self.reference, Picture::of(film)) {
+            let (width, coarse) = (film.width as usize, self.subject.coarse());
+            let errors = |image, truth| -> Errors { compare(image, truth, width, coarse) };
+            point.whole = Some(errors(&picture.whole, &reference.whole));
+            let gathers = film.pixels().any(|p| p.lores.trials() > 0);
+            point.indirect = gathers.then(|| errors(&picture.indirect, &reference.indirect));
+            write_image(&self.store.image(key, trials), &picture, film.width)?;
+        }
+        Ok(point)
+    }
+}
+
+fn write_image(path: &Path, picture: &Picture, width: u32) -> Result<()> {
+    let options = WriteOptions { half: true, ..WriteOptions::default() };
+    image::write(path, &picture.develop(width), &Metadata::new(), &options)
+}
+
+/// Mean of `L_dev / L` over the pixels and bands that are not black.
+fn mean_dev(film: &Film, pass: impl Fn(&crate::render::film::Pixel) -> &PixelSum) -> f64 {
+    let (mut sum, mut count) = (0.0, 0u64);
+    for pixel in film.pixels() {
+        let (mean, dev) = (pass(pixel).mean(), pass(pixel).dev());
+        for (mean, dev) in mean.into_iter().zip(dev).filter(|(mean, _)| *mean > 0.0) {
+            sum += dev / mean;
+            count += 1;
+        }
+    }
+    sum / count.max(1) as f64
+}
