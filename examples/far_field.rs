@@ -1,11 +1,20 @@
 //! How well the simplified scene stands for the detailed one beyond `r_thresh`, all else equal.
 //!
 //! At points that the camera and gather rays see, the irradiance that arrives from beyond `r_thresh` is gathered from radiosities
-//! on normal + simple surfaces, and along the same rays from radiosities on normal + complex surfaces. Printed are the mean
-//! over points of the absolute difference, and the difference of the means, over the mean; for boxes fitted both ways and for
-//! clusters that are just dropped.
+//! on normal + simple surfaces, and along the same rays from radiosities on normal + complex surfaces. Everything is done
+//! twice with independent random numbers, rays and radiosities alike. Printed are, in per cent of the mean irradiance,
 //!
-//! `cargo run --release --example far_field -- [--r-thresh X] [--patch-size X] [--longest X] [--points N] [--rays N] SCENE...`
+//! * `mean |d|`: the mean over points of the absolute difference, noise included;
+//! * `noise`: the part of it that repetition changes, half the mean absolute difference between both repetitions;
+//! * `rms d`: the root of the mean over points of the product of both repetitions' differences, which is free of noise and an upper
+//!   bound of the mean absolute difference;
+//! * `mean d`: the difference of the means;
+//!
+//! for boxes fitted both ways and for clusters that are just dropped. `--by-surface` says where the flux boxes' mean difference
+//! comes from: by what a ray meets in N+C and what it meets in N+S.
+//!
+//! `cargo run --release --example far_field -- [--r-thresh X] [--beta X] [--patch-size X] [--longest X] [--points N] [--rays N]
+//! [--error X] [--by-surface] [--only flux] SCENE...`
 
 use std::path::Path;
 use std::sync::Arc;
@@ -19,31 +28,47 @@ use gsii::radiosity::{RadiosityScene, Solution, solve};
 use gsii::sampling::{basis, cosine_hemisphere, hash_all, sobol, unit};
 use gsii::scene::{Camera, LoadOptions, Scene, load};
 use gsii::shading::SurfacePoint;
-use gsii::simplify::{BoxFit, Cluster, SimplifiedGeometry, TriangleSource, simplify};
+use gsii::simplify::{BoxFit, Class, Cluster, Simplified, SimplifiedGeometry, TriangleSource, simplify};
 
 type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
+/// Repetitions with independent random numbers.
+const HALVES: usize = 2;
+
+struct Options {
+    settings: Settings,
+    points: u32,
+    rays: u32,
+    by_surface: bool,
+    only: Option<String>,
+}
+
 fn main() -> Outcome<()> {
-    let (mut settings, mut scenes) = (Settings { radiosity_error: 0.02, ..Settings::default() }, Vec::new());
-    let (mut points, mut rays) = (10_000, 64);
+    let settings = Settings { radiosity_error: 0.02, ..Settings::default() };
+    let mut options = Options { settings, points: 10_000, rays: 64, by_surface: false, only: None };
+    let mut scenes = Vec::new();
     let mut args = std::env::args().skip(1);
     while let Some(arg) = args.next() {
         let mut value = || args.next().ok_or(format!("{arg} needs a value"));
         match arg.as_str() {
-            "--r-thresh" => settings.r_thresh = Some(value()?.parse()?),
-            "--patch-size" => settings.patch_size = Some(value()?.parse()?),
-            "--longest" => settings.longest_cluster = value()?.parse()?,
-            "--points" => points = value()?.parse()?,
-            "--rays" => rays = value()?.parse()?,
+            "--r-thresh" => options.settings.r_thresh = Some(value()?.parse()?),
+            "--beta" => options.settings.beta = value()?.parse()?,
+            "--patch-size" => options.settings.patch_size = Some(value()?.parse()?),
+            "--longest" => options.settings.longest_cluster = value()?.parse()?,
+            "--error" => options.settings.radiosity_error = value()?.parse()?,
+            "--points" => options.points = value()?.parse()?,
+            "--rays" => options.rays = value()?.parse()?,
+            "--by-surface" => options.by_surface = true,
+            "--only" => options.only = Some(value()?),
             _ => scenes.push(arg),
         }
     }
     println!(
-        "{:<18} {:>7} {:>6} {:>8}  {:<9} {:>10} {:>10}",
-        "scene", "r_thresh", "boxes", "surfaces", "clusters", "mean |d|", "mean d"
+        "{:<18} {:>8} {:>7} {:>6} {:>8}  {:<9} {:>8} {:>7} {:>7} {:>8}",
+        "scene", "r_thresh", "beta", "boxes", "surfaces", "clusters", "mean |d|", "noise", "rms d", "mean d"
     );
     for scene in scenes {
-        if let Err(error) = measure(Path::new(&scene), settings.clone(), points, rays) {
+        if let Err(error) = measure(Path::new(&scene), &options) {
             println!("{scene}: {error}");
         }
     }
@@ -54,7 +79,14 @@ fn main() -> Outcome<()> {
 struct Lit {
     geometry: SimplifiedGeometry,
     rays: Box<dyn RayScene>,
-    solution: Solution,
+    solutions: [Solution; HALVES],
+}
+
+/// What a ray meets.
+#[derive(Clone, Copy)]
+struct Met {
+    source: Option<TriangleSource>,
+    radiosity: f64,
 }
 
 impl Lit {
@@ -68,29 +100,32 @@ impl Lit {
     ) -> Outcome<Self> {
         let rays = geometry.build(scene, backend)?;
         let input = RadiosityScene { scene, lights, geometry: &geometry, clusters, rays: rays.as_ref() };
-        let solution = solve(&input, &settings.radiosity_params(), &Progress::silent())?;
-        Ok(Lit { geometry, rays, solution })
+        let solve =
+            |seed| solve(&input, &Settings { seed, ..settings.clone() }.radiosity_params(), &Progress::silent());
+        let solutions = [solve(1)?, solve(2)?];
+        Ok(Lit { geometry, rays, solutions })
     }
 
-    /// Mean radiosity that the rays of each point meet.
-    fn gather(&self, rays: &[Ray], rays_a_point: usize) -> Vec<f64> {
+    fn meet(&self, rays: &[Ray], half: usize) -> Vec<Met> {
         let mut hits = vec![Hit::MISS; rays.len()];
         self.rays.closest(rays, Visible::All, Coherence::Incoherent, &mut hits);
-        let radiosity = |(ray, hit): (&Ray, &Hit)| {
+        let met = |(ray, hit): (&Ray, &Hit)| {
             if !hit.is_hit() {
-                return 0.0;
+                return Met { source: None, radiosity: 0.0 };
             }
-            let [a, b, c] = self.geometry.triangles[hit.triangle as usize].map(|v| self.geometry.positions[v as usize]);
-            let front = (b - a).cross(c - a).dot(ray.direction) < 0.0
-                || matches!(self.geometry.sources[hit.triangle as usize], TriangleSource::BoxFace { .. });
-            f64::from(self.solution.radiosity(hit.triangle, hit.u, hit.v, front).element_sum()) / 3.0
+            let source = self.geometry.sources[hit.triangle as usize];
+            let solution = &self.solutions[half];
+            let front =
+                solution.is_front(hit.triangle, ray.direction) || matches!(source, TriangleSource::BoxFace { .. });
+            let radiosity = solution.radiosity(hit.triangle, hit.u, hit.v, front);
+            Met { source: Some(source), radiosity: f64::from(radiosity.element_sum()) / 3.0 }
         };
-        let all: Vec<f64> = rays.iter().zip(&hits).map(radiosity).collect();
-        all.chunks(rays_a_point).map(|of_point| of_point.iter().sum::<f64>() / rays_a_point as f64).collect()
+        rays.iter().zip(&hits).map(met).collect()
     }
 }
 
-fn measure(path: &Path, mut settings: Settings, points: u32, rays_a_point: u32) -> Outcome<()> {
+fn measure(path: &Path, options: &Options) -> Outcome<()> {
+    let mut settings = options.settings.clone();
     let scene = Arc::new(load(path, &LoadOptions::default())?);
     let backend = settings.backend.create(0)?;
     let lights = Lights::new(&scene);
@@ -100,37 +135,112 @@ fn measure(path: &Path, mut settings: Settings, points: u32, rays_a_point: u32) 
     let detailed = unclassified.build(&scene, backend.as_ref())?;
     auto::fill_in(&mut settings, &scene, detailed.as_ref(), std::slice::from_ref(&camera));
 
-    let far = far_rays(&scene, detailed.as_ref(), &camera, settings.r_thresh(), points, rays_a_point);
-    let mut reference = None;
+    let far: [Vec<Ray>; HALVES] = std::array::from_fn(|half| {
+        far_rays(&scene, detailed.as_ref(), &camera, settings.r_thresh(), options.points, options.rays, half as u32)
+    });
+    let mut reference: Option<[Vec<Met>; HALVES]> = None;
     for (name, box_fit) in [("flux", BoxFit::Flux), ("paper1993", BoxFit::Paper1993), ("none", BoxFit::Flux)] {
+        if options.only.as_ref().is_some_and(|only| only != name) {
+            continue;
+        }
         settings.box_fit = box_fit;
         let s = simplify(&scene, backend.as_ref(), &settings.simplify_params(), &Progress::silent())?;
         let lit =
             |geometry, clusters: &[Cluster]| Lit::new(&scene, &lights, backend.as_ref(), geometry, clusters, &settings);
         if reference.is_none() {
-            reference = Some(lit(everything(&s.surface_of_triangle), &[])?.gather(&far, rays_a_point as usize));
+            let complete = lit(everything(&s.surface_of_triangle), &[])?;
+            reference = Some(std::array::from_fn(|half| complete.meet(&far[half], half)));
         }
         let simple = if name == "none" {
             lit(SimplifiedGeometry::normal(&scene, &s.surfaces, &s.surface_of_triangle), &[])?
         } else {
             lit(s.geometry.clone(), &s.clusters)?
         };
-        let expected = reference.as_deref().unwrap_or_default();
-        let found = simple.gather(&far, rays_a_point as usize);
-        let sum: f64 = expected.iter().sum();
-        let difference: f64 = found.iter().zip(expected).map(|(a, b)| a - b).sum();
-        let absolute: f64 = found.iter().zip(expected).map(|(a, b)| (a - b).abs()).sum();
+        let found: [Vec<Met>; HALVES] = std::array::from_fn(|half| simple.meet(&far[half], half));
+        let Some(expected) = &reference else { continue };
+        let e = Errors::new(expected, &found, options.rays as usize);
         println!(
-            "{:<18} {:>7.3} {:>6} {:>8}  {name:<9} {:>9.2}% {:>+9.2}%",
+            "{:<18} {:>8.4} {:>7.4} {:>6} {:>8}  {name:<9} {:>7.2}% {:>6.2}% {:>6.2}% {:>+7.2}%",
             path.file_stem().unwrap_or_default().to_string_lossy(),
             settings.r_thresh(),
+            settings.beta,
             s.clusters.len(),
             simple.geometry.surfaces,
-            100.0 * absolute / sum,
-            100.0 * difference / sum
+            100.0 * e.absolute,
+            100.0 * e.noise,
+            100.0 * e.rms,
+            100.0 * e.mean
         );
+        if options.by_surface && name == "flux" {
+            by_surface(&s, expected, &found);
+        }
     }
     Ok(())
+}
+
+/// Differences of irradiance, over its mean.
+struct Errors {
+    absolute: f64,
+    noise: f64,
+    rms: f64,
+    mean: f64,
+}
+
+impl Errors {
+    fn new(expected: &[Vec<Met>; HALVES], found: &[Vec<Met>; HALVES], rays_a_point: usize) -> Self {
+        let of_points = |met: &[Met]| -> Vec<f64> {
+            met.chunks(rays_a_point).map(|m| m.iter().map(|m| m.radiosity).sum::<f64>() / rays_a_point as f64).collect()
+        };
+        let (expected, found) = (expected.each_ref().map(|m| of_points(m)), found.each_ref().map(|m| of_points(m)));
+        let n = expected[0].len() as f64;
+        let mean_irradiance = expected.iter().flatten().sum::<f64>() / (2.0 * n);
+        let d = |half: usize, point: usize| (found[half][point] - expected[half][point]) / mean_irradiance;
+        let mean = |f: &dyn Fn(f64, f64) -> f64| (0..expected[0].len()).map(|p| f(d(0, p), d(1, p))).sum::<f64>() / n;
+        Errors {
+            absolute: mean(&|a, b| 0.5 * (a + b).abs()),
+            noise: mean(&|a, b| 0.5 * (a - b).abs()),
+            rms: mean(&|a, b| a * b).max(0.0).sqrt(),
+            mean: mean(&|a, b| 0.5 * (a + b)),
+        }
+    }
+}
+
+/// Where the mean difference comes from.
+fn by_surface(s: &Simplified, expected: &[Vec<Met>; HALVES], found: &[Vec<Met>; HALVES]) {
+    const KINDS: [&str; 5] = ["normal", "clustered", "dropped", "box", "nothing"];
+    let kind = |met: &Met| match met.source {
+        None => 4,
+        Some(TriangleSource::BoxFace { .. }) => 3,
+        Some(TriangleSource::Scene { triangle }) => {
+            match s.surfaces[s.surface_of_triangle[triangle as usize] as usize].class {
+                Class::Normal => 0,
+                Class::Complex { cluster: Some(_) } => 1,
+                Class::Complex { cluster: None } => 2,
+            }
+        }
+    };
+    let mut table = [[(0_u64, 0.0, 0.0); 5]; 5];
+    let (mut all, mut sum) = (0_u64, 0.0);
+    for (e, f) in expected.iter().flatten().zip(found.iter().flatten()) {
+        let cell = &mut table[kind(e)][kind(f)];
+        cell.0 += 1;
+        cell.1 += e.radiosity;
+        cell.2 += f.radiosity - e.radiosity;
+        all += 1;
+        sum += e.radiosity;
+    }
+    println!("  N+C meets  N+S meets     rays   of light     mean d");
+    for (row, of) in table.iter().zip(KINDS) {
+        for (&(rays, light, d), becomes) in row.iter().zip(KINDS).filter(|(cell, _)| cell.0 > 0) {
+            let percent = |x: f64| 100.0 * x / sum;
+            println!(
+                "  {of:<10} {becomes:<10} {:>6.2}%   {:>7.2}%   {:>+7.2}%",
+                100.0 * rays as f64 / all as f64,
+                percent(light),
+                percent(d)
+            );
+        }
+    }
 }
 
 /// The far parts of gather rays from `points` points, half of them seen by the camera and half by gather rays from there.
@@ -142,6 +252,7 @@ fn far_rays(
     r_thresh: f32,
     points: u32,
     rays_a_point: u32,
+    half: u32,
 ) -> Vec<Ray> {
     const STREAM: u32 = 0x6661_7266;
     let trace = |rays: &[Ray]| {
@@ -185,7 +296,7 @@ fn far_rays(
 
     let mut rays: Vec<Ray> = Vec::with_capacity(ends.len() * rays_a_point as usize);
     for (p, (ray, hit)) in (0u32..).zip(&ends) {
-        let stream = hash_all(&[STREAM, p]);
+        let stream = hash_all(&[STREAM, p, half]);
         for i in 0..rays_a_point {
             let u = sobol(i, 0, stream);
             let near = r_thresh * (0.5 + unit(hash_all(&[stream, i])));
