@@ -227,11 +227,12 @@ mod tests {
         let (noise, bias) = (0.2, 0.1);
         let e = compare(&halves(1.0 + bias, noise, 1), &halves(1.0, 0.1, 2), 64, 1);
         // Four standard errors fail once in 16,000 (fixed numbers). Denominators carry the reference's noise of 0.07 a pixel:
-        // E[1/r^2] is 1 + 3 * 0.005 to first order.
-        let scale = (1.0 + 3.0 * 0.005) / 1.01;
-        let exact = scale * (bias * bias + noise * noise / 2.0);
+        // With r = 1 + e, e^2 = 0.005 in the mean, E[1/r^2] is 1 + 3 e^2 to first order, and E[-2 bias e / r^2] is 4 bias e^2.
+        let e2 = 0.005;
+        let scale = (1.0 + 3.0 * e2) / 1.01;
+        let exact = scale * (bias * bias + noise * noise / 2.0) + 4.0 * bias * e2 / 1.01;
         assert!((e.rel_mse - exact).abs() < 4.0 * e.rel_mse_error + 0.02 * exact, "{e:?}, {exact}");
-        let exact = scale * bias * bias;
+        let exact = scale * bias * bias + 4.0 * bias * e2 / 1.01;
         assert!((e.bias_rel_mse - exact).abs() < 4.0 * e.bias_rel_mse_error + 0.02 * exact, "{e:?}, {exact}");
         assert!((e.relative_bias - bias).abs() < 4.0 * e.relative_bias_error, "{e:?}");
         // Means of 4096 pixels and three bands of two halves each.

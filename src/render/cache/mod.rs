@@ -5,6 +5,7 @@
 //! (Ward, Rubinstein and Clear 1988). How far a record reaches follows from the distances of what it sees, so that records are
 //! close together next to other surfaces. Where none reaches, paths gather as without a cache.
 
+mod clamp;
 mod index;
 mod record;
 
@@ -17,6 +18,7 @@ use super::view::ViewRays;
 use crate::backend::Ray;
 use crate::sampling::{hash_all, sobol};
 use crate::scene::Camera;
+use clamp::clamped_distances;
 use index::Index;
 use record::{Record, Strata};
 
@@ -108,32 +110,10 @@ impl IrradianceCache {
         found.collect::<Vec<_>>().concat()
     }
 
-    /// Works out how far each record reaches: no farther than a neighbour's distance and the way there allow (Krivanek et al.
-    /// 2006, neighbour clamping).
+    /// Works out how far each record reaches.
     fn settle(&mut self, r_thresh: f32) {
-        // Sorted along one axis, neighbours are close together.
-        let mut order: Vec<usize> = (0..self.records.len()).collect();
-        order.sort_by(|&a, &b| self.records[a].position.x.total_cmp(&self.records[b].position.x));
-        let all = &self.records;
-        let limit = r_thresh / ACCURACY;
-        let clamped: Vec<f32> = (0..order.len())
-            .into_par_iter()
-            .map(|place| {
-                let own = &all[order[place]];
-                let mut distance = own.distance.min(own.scale_of_change()).min(limit);
-                let near = |&&other: &&usize| (all[other].position.x - own.position.x).abs() < distance;
-                let (before, after) = (order[..place].iter().rev(), order[place + 1..].iter());
-                let mut least = distance;
-                for &other in before.take_while(near).chain(after.take_while(near)) {
-                    let other = &all[other];
-                    least = least.min(other.distance + other.position.distance(own.position));
-                }
-                distance = least;
-                distance
-            })
-            .collect();
-        for (place, distance) in clamped.into_iter().enumerate() {
-            let record = &mut self.records[order[place]];
+        let distances = clamped_distances(&self.records, r_thresh / ACCURACY);
+        for (record, distance) in self.records.iter_mut().zip(distances) {
             record.refuses = ACCURACY * distance < TOO_SMALL * record.least_reach;
             record.reach = (ACCURACY * distance).max(record.least_reach);
         }
@@ -198,7 +178,7 @@ impl IrradianceCache {
 #[derive(Clone)]
 struct Place {
     captured: Captured,
-    /// Width of a pixel there, along the surface, scene units.
+    /// Width of a pixel there, scene units.
     footprint: f32,
 }
 
