@@ -29,7 +29,7 @@ impl Plane {
     ///
     /// The clearance bounds the error of an f32 intersection test: the signed distance to the plane is a determinant of
     /// vectors no longer than the triangle's extent `w` along each axis, divided by the length of the normal; its six products
-    /// are each off by at most [`TEST_ROUNDINGS`] roundings. That holds for Moeller-Trumbore as for Embree's robust
+    /// are each off by at most `TEST_ROUNDINGS` roundings. That holds for Moeller-Trumbore as for Embree's robust
     /// (Pluecker) test, and is nothing for walls along the axes.
     pub fn of(corners: [Vec3; 3]) -> Self {
         let [a, b, c] = corners.map(Vec3::as_dvec3);

@@ -1,6 +1,6 @@
 //! Speed against error of every method of the paper, its tables, and a page that shows them.
 //!
-//! [`run`] makes a converged reference of each scene ([`reference`]), carries out a ladder of runs ([`plan`], [`work`]), compares
+//! [`run`] makes a converged reference of each scene ([`mod@reference`]), carries out a ladder of runs ([`plan`], [`work`]), compares
 //! every image with the reference in a way that tells bias from noise ([`error`]), and writes what came out ([`report`]). What is
 //! finished is kept ([`record`]): a study that was stopped goes on where it was.
 
