@@ -54,7 +54,8 @@ fn white_bodies_vanish_in_uniform_surroundings() {
     let scene = within(&clutter(1.0), Environment::uniform(Vec3::splat(exact as f32)));
     let methods = [(Method::Mcpt, None), (Method::Pmm, None), (Method::Gsii, Some(0.5))];
     for (method, r_thresh) in methods {
-        let settings = Settings { method, r_thresh, radiosity_error: 0.03, ..Settings::default() };
+        let settings =
+            Settings { method, r_thresh, radiosity_error: 0.03, patch_size: Some(0.5), ..Settings::default() };
         let (prepared, stats) = prepare(&scene, settings);
         assert!(method != Method::Gsii || stats.counts.clusters > 0, "something is simplified");
         let rendering = render(&prepared, &fixed(36, 24, 64, 5));
