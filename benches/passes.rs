@@ -14,9 +14,9 @@ use std::time::Instant;
 use gsii::backend::{Coherence, Hit, Ray, RayScene, Visible};
 use gsii::pipeline::{Method, Prepared, Settings, Stats, choose_camera};
 use gsii::progress::Progress;
-use gsii::render::integrator::{Batch, Workspace};
+use gsii::render::integrator::Batch;
 use gsii::render::path::Passes;
-use gsii::render::{BATCH_TRIALS, FarField, Film, World};
+use gsii::render::{BATCH_TRIALS, FarField, Film, Workspace, World};
 use gsii::scene::Camera;
 use gsii::scene::gltf::{LoadOptions, load};
 

@@ -20,6 +20,7 @@ pub mod sampling;
 pub mod scene;
 pub mod shading;
 pub mod simplify;
+pub mod srgb;
 pub mod study;
 
 pub use error::{Error, Result};

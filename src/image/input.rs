@@ -5,8 +5,8 @@ use std::path::Path;
 use super::buffer::Image;
 use super::metadata::{Metadata, Value};
 use super::oiio::{Attempt, Reader};
-use super::view::srgb_decode;
 use crate::error::{Error, Result};
+use crate::srgb::srgb_decode;
 
 /// Reads the first image of a file. Integer files are decoded from sRGB unless they say that they are linear, so the
 /// result is linear whatever the format; opacity stays as stored.

@@ -178,7 +178,7 @@ fn dither_is_unbiased_and_repeatable() {
     };
     let first = bytes();
     assert_eq!(first, bytes());
-    let wanted = view::srgb_encode(0.1801) * 255.0;
+    let wanted = crate::srgb::srgb_encode(0.1801) * 255.0;
     let values: Vec<f32> = first.chunks(4).flat_map(|p| &p[..3]).map(|&v| f32::from(v)).collect();
     let mean = values.iter().sum::<f32>() / values.len() as f32;
     // Bernoulli rounding, standard deviation at most 1/2 per value; 5 sigma fail falsely once in 1.7 million.

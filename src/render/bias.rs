@@ -7,8 +7,9 @@
 use rayon::prelude::*;
 
 use super::RenderParams;
-use super::integrator::{Workspace, World};
+use super::integrator::World;
 use super::path::Path;
+use super::workspace::Workspace;
 use crate::sampling::{hash_all, sobol};
 use crate::scene::{Camera, Lens};
 use crate::shading::Lobes;

@@ -321,7 +321,7 @@ mod tests {
     fn order(mut film: Film) -> Vec<u32> {
         for tile in &mut film.tiles {
             for i in 0..tile.pixels.len() as u32 {
-                let (x, y) = (tile.origin[0] + i % tile.size[0], tile.origin[1] + i / tile.size[0]);
+                let [x, y] = tile.pixel(i);
                 tile.pixels[i as usize].feature.hits = y * 19 + x;
             }
         }

@@ -12,10 +12,11 @@
 //! | `L_{l,h}` | `E S* D S+ D ..` | LORES: the gather ray goes on through mirrors and glass |
 //! | `L_{l,c}` | `E S* D S+ L` | LORES: emission met after at least one highly directional event |
 //!
-//! L is a light source or the environment. Light that passes straight through panes counts as direct (`L_{l,s}`): shadow rays take the panes' transmittance.
+//! L is a light source or the environment. Light that passes straight through panes counts as direct (`L_{l,s}`): shadow rays
+//! take the panes' transmittance.
 
 use std::f32::consts::FRAC_1_PI;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use glam::Vec3;
 
@@ -24,10 +25,11 @@ use super::film::{Feature, Tile};
 use super::nearness::Nearness;
 use super::path::{Arrival, Passes, Path, Shadow};
 use super::view::ViewRays;
+use super::workspace::Workspace;
 use crate::backend::edge::settle_edges;
 use crate::backend::{Coherence, Hit, Ray, RayScene, Visible};
 use crate::lighting::Lights;
-use crate::lighting::shadow::{ShadowBuffers, ShadowRay, light_visibility};
+use crate::lighting::shadow::{ShadowRay, light_visibility};
 use crate::radiosity::Solution;
 use crate::sampling::sobol;
 use crate::scene::{Camera, Scene};
@@ -111,109 +113,6 @@ impl FarField<'_> {
         let front = self.solution.is_front(hit.triangle, direction);
         self.solution.radiosity(hit.triangle, hit.u, hit.v, front) * FRAC_1_PI
     }
-}
-
-/// Which part of a weakly directional lobe a path has to gather.
-#[derive(Clone, Copy)]
-enum Rough {
-    Whole,
-    /// Only rough reflection, as the diffuse part came from the cache; by this share of all paths.
-    Only {
-        kept: f32,
-    },
-}
-
-/// Rays traced, by purpose.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct RayCounts {
-    /// Camera rays and their highly directional chains.
-    pub view: u64,
-    /// Near parts of gather rays, in the detailed scene.
-    pub near: u64,
-    /// Far parts of gather rays, in the simplified scene.
-    pub far: u64,
-    /// Shadow rays at points seen by the camera.
-    pub shadow_hires: u64,
-    /// Shadow rays at points that gather rays hit.
-    pub shadow_lores: u64,
-}
-
-impl RayCounts {
-    /// Rays of the HIRES pass.
-    pub fn hires(&self) -> u64 {
-        self.view + self.shadow_hires
-    }
-
-    /// Rays of the LORES pass.
-    pub fn lores(&self) -> u64 {
-        self.near + self.far + self.shadow_lores
-    }
-}
-
-impl std::ops::AddAssign for RayCounts {
-    fn add_assign(&mut self, o: Self) {
-        self.view += o.view;
-        self.near += o.near;
-        self.far += o.far;
-        self.shadow_hires += o.shadow_hires;
-        self.shadow_lores += o.shadow_lores;
-    }
-}
-
-/// Time spent in the two passes. A round of view rays with its shadow rays is HIRES, the rounds after it are LORES.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct PassTimes {
-    /// In HIRES.
-    pub hires: Duration,
-    /// In LORES.
-    pub lores: Duration,
-}
-
-impl PassTimes {
-    /// Share of HIRES, 0..=1.
-    pub fn hires_share(self) -> f64 {
-        let sum = (self.hires + self.lores).as_secs_f64();
-        if sum > 0.0 { self.hires.as_secs_f64() / sum } else { 0.0 }
-    }
-
-    /// The same shares of another total.
-    pub fn scaled_to(self, total: Duration) -> PassTimes {
-        let hires = total.mul_f64(self.hires_share());
-        PassTimes { hires, lores: total - hires }
-    }
-}
-
-impl std::ops::AddAssign for PassTimes {
-    fn add_assign(&mut self, o: Self) {
-        self.hires += o.hires;
-        self.lores += o.lores;
-    }
-}
-
-/// Buffers of one thread, reused from batch to batch.
-#[derive(Default)]
-pub struct Workspace {
-    paths: Vec<Path>,
-    next: Vec<Path>,
-    /// Indices into `paths` of the rays in `rays`.
-    traced: Vec<u32>,
-    rays: Vec<Ray>,
-    hits: Vec<Hit>,
-    far: Vec<u32>,
-    shadows: Vec<Shadow>,
-    shadow_rays: Vec<ShadowRay>,
-    shadow_buffers: ShadowBuffers,
-    transmittance: Vec<Vec3>,
-    hires: Vec<Vec3>,
-    lores: Vec<Vec3>,
-    /// What view rays meet first, one a trial; empty when nobody wants to know.
-    features: Vec<Feature>,
-    /// How far each trial's first ray went; empty when nobody wants to know.
-    distances: Vec<f32>,
-    /// Rays traced since this was last reset.
-    pub counts: RayCounts,
-    /// Time spent since this was last reset.
-    pub times: PassTimes,
 }
 
 /// A batch of trials of one tile.
@@ -494,7 +393,8 @@ impl<'a> World<'a> {
             self.sample_lights(ws, &path, &point, facing, &bsdf, [u[0], u[1], u[2]]);
         }
 
-        let mut rough = Rough::Whole;
+        // Share of paths that gather the rest when the diffuse part came from the cache.
+        let mut rough_share = None;
         let mut low = low;
         if !path.gathers
             && passes.lores
@@ -507,7 +407,7 @@ impl<'a> World<'a> {
             ws.lores[trial] += path.throughput * diffuse * light;
             low = bsdf.albedo_rough();
             // Little light is left: some paths gather it for all.
-            rough = Rough::Only { kept: (PATHS_PER_ALBEDO * low.max_element()).min(1.0) };
+            rough_share = Some((PATHS_PER_ALBEDO * low.max_element()).min(1.0));
         }
 
         let choose_high = choose_high(low, high);
@@ -540,10 +440,10 @@ impl<'a> World<'a> {
             return;
         }
         let mut rest = (u[3] - choose_high) / (1.0 - choose_high);
-        let (sample, share) = match rough {
-            Rough::Whole => (bsdf.sample_low([u[0], u[1], u[2]]), 1.0),
-            Rough::Only { kept } if rest >= kept => return,
-            Rough::Only { kept } => (bsdf.sample_rough([u[0], u[1]]), kept),
+        let (sample, share) = match rough_share {
+            None => (bsdf.sample_low([u[0], u[1], u[2]]), 1.0),
+            Some(share) if rest >= share => return,
+            Some(share) => (bsdf.sample_rough([u[0], u[1]]), share),
         };
         let Some(sample) = sample else { return };
         rest /= share;
@@ -619,48 +519,6 @@ impl<'a> World<'a> {
             } else {
                 ws.counts.shadow_hires += 1;
             }
-        }
-    }
-}
-
-impl Workspace {
-    /// A ray met something at distance `t`.
-    fn note_distance(&mut self, path: u32, t: f32) {
-        let trial = self.paths[path as usize].trial;
-        if let Some(distance) = self.distances.get_mut(trial as usize)
-            && distance.is_infinite()
-        {
-            *distance = t;
-        }
-    }
-
-    /// A gather ray ended in the detailed scene.
-    fn note_near(&mut self, path: u32) {
-        let path = &self.paths[path as usize];
-        if path.gathers
-            && let Some(feature) = self.features.get_mut(path.trial as usize)
-        {
-            feature.near += 1;
-        }
-    }
-
-    /// A gather ray of length `distance` looked a radiosity up.
-    fn note_lookup(&mut self, path: u32, distance: f32) {
-        let trial = self.paths[path as usize].trial;
-        if let Some(feature) = self.features.get_mut(trial as usize) {
-            feature.lookups += 1;
-            feature.lookup_distance += distance;
-        }
-    }
-
-    /// Forgets the last batch and makes room for the sums of `trials` trials.
-    fn start(&mut self, trials: usize) {
-        self.paths.clear();
-        self.features.clear();
-        self.distances.clear();
-        for sums in [&mut self.hires, &mut self.lores] {
-            sums.clear();
-            sums.resize(trials, Vec3::ZERO);
         }
     }
 }

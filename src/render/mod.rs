@@ -9,7 +9,9 @@ pub mod nearness;
 pub mod path;
 pub mod plan;
 pub mod show;
+pub mod tally;
 pub mod view;
+pub mod workspace;
 
 use std::time::{Duration, Instant};
 
@@ -18,11 +20,13 @@ use rayon::prelude::*;
 pub use cache::IrradianceCache;
 use film::Tile;
 pub use film::{Film, Region};
-use integrator::{Batch, Workspace};
-pub use integrator::{FarField, PassTimes, RayCounts, World};
+use integrator::Batch;
+pub use integrator::{FarField, World};
 pub use nearness::Nearness;
 use path::Passes;
 use plan::Allocation;
+pub use tally::{PassTimes, RayCounts};
+pub use workspace::Workspace;
 
 use crate::clock::Stopwatch;
 use crate::progress::Progress;
@@ -119,7 +123,7 @@ pub fn render_rounds(
     let world = &World { cache: cache.as_ref(), ..*world };
     let mut renderer = Renderer::new(world, camera, params);
     let mut film = params.film();
-    let plan = renderer.everywhere(film.tiles.len(), params.max_trials);
+    let plan = vec![Allocation::even(params.max_trials); film.tiles.len()];
     let bar =
         progress.stage("rendering", u64::from(params.max_trials) * u64::from(params.width) * u64::from(params.height));
     renderer.rounds(&mut film, &plan, &over, &|n| bar.inc(n), watch);
@@ -141,11 +145,11 @@ pub fn render(world: &World<'_>, camera: &Camera, params: &RenderParams, progres
 
     let mut film = params.film();
     let plan = if params.min_trials == params.max_trials {
-        renderer.everywhere(film.tiles.len(), params.min_trials)
+        vec![Allocation::even(params.min_trials); film.tiles.len()]
     } else {
         let mut pilot = plan::pilot_tiles(params.region(), params);
         let trials = plan::pilot_trials(params);
-        let all = renderer.everywhere(pilot.len(), trials);
+        let all = vec![Allocation::even(trials); pilot.len()];
         renderer.round(&mut pilot, &all, 0..trials, hash_all(&[params.seed, PILOT]), &over, &|_| {});
         plan::allocate(&pilot, &film, params)
     };
@@ -177,15 +181,6 @@ fn irradiance_cache(
     cache
 }
 
-impl PassTimes {
-    /// The same shares of `total`, less what filling the irradiance cache took: that is LORES.
-    fn after_cache(self, total: Duration, filled: Duration) -> PassTimes {
-        let mut times = self.scaled_to(total.saturating_sub(filled));
-        times.lores += filled;
-        times
-    }
-}
-
 struct Renderer<'a> {
     world: &'a World<'a>,
     camera: &'a Camera,
@@ -197,11 +192,6 @@ struct Renderer<'a> {
 impl<'a> Renderer<'a> {
     fn new(world: &'a World<'a>, camera: &'a Camera, params: &'a RenderParams) -> Self {
         Renderer { world, camera, params, rays: RayCounts::default(), times: PassTimes::default() }
-    }
-
-    /// The plan that gives every pixel the same number of trials.
-    fn everywhere(&self, tiles: usize, trials: u32) -> Vec<Allocation> {
-        vec![Allocation { hires: trials, lores: trials }; tiles]
     }
 
     /// Carries out a plan in rounds. They double, so that there is a whole image early and prefixes of the point sets stay well

@@ -20,6 +20,11 @@ pub struct Allocation {
 }
 
 impl Allocation {
+    /// As many in both passes.
+    pub fn even(trials: u32) -> Self {
+        Allocation { hires: trials, lores: trials }
+    }
+
     /// The larger of both.
     pub fn most(&self) -> u32 {
         self.hires.max(self.lores)
@@ -118,7 +123,7 @@ pub fn allocate(pilot: &[Tile], film: &Film, params: &RenderParams) -> Vec<Alloc
         }
         let radiance = own.mean.hypot(DARK * image_mean);
         if radiance == 0.0 {
-            return Allocation { hires: params.min_trials, lores: params.min_trials };
+            return Allocation::even(params.min_trials);
         }
         let hires_trials = trials(hires / (f64::from(params.hires_error) * radiance).powi(2));
         let dev_hires = (hires / f64::from(hires_trials)).sqrt();

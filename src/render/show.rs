@@ -5,7 +5,8 @@ use std::time::Duration;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::integrator::{FarField, PassTimes, RayCounts, World};
+use super::integrator::{FarField, World};
+use super::tally::{PassTimes, RayCounts};
 use super::view::ViewRays;
 use super::{RenderParams, Rendering};
 use crate::backend::{Coherence, Hit, Ray, Visible};

@@ -5,6 +5,8 @@ use std::sync::LazyLock;
 use glam::{Vec2, Vec4};
 use rayon::prelude::*;
 
+use crate::srgb::srgb_decode;
+
 /// What texture coordinates outside of 0..1 mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
 pub enum Wrap {
@@ -43,12 +45,7 @@ pub enum Texels {
     Float(Vec<f32>),
 }
 
-/// The sRGB decoding function (IEC 61966-2-1), encoded value 0..=1 to linear 0..=1.
-pub fn srgb_to_linear(encoded: f32) -> f32 {
-    if encoded <= 0.04045 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
-}
-
-static SRGB8: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|i| srgb_to_linear(i as f32 / 255.0)));
+static SRGB8: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|i| srgb_decode(i as f32 / 255.0)));
 
 impl Wrap {
     /// Texel number for any integer texel position of an axis with `size` texels.

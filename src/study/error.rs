@@ -4,6 +4,7 @@
 //! the squared difference of what the halves estimate, without the noise that a plain square would add. Which halves are mixed
 //! decides what is left in: `(i-a)(i-b)` keeps the image's own noise (its error), `(i1-a)(i2-b)` does not (its bias).
 
+use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::image::Image;
@@ -14,6 +15,11 @@ const FLOOR: f64 = 0.01;
 
 /// Radiance of all pixels, row by row, one entry a band.
 pub type Plane = Vec<[f64; 3]>;
+
+/// A plane in single precision, as images hold it.
+pub fn rounded(plane: &Plane) -> Vec<Vec3> {
+    plane.iter().map(|v| DVec3::from(*v).as_vec3()).collect()
+}
 
 /// Two independent estimates of the same radiance.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -72,8 +78,7 @@ impl Picture {
     pub fn develop(&self, width: u32) -> Image {
         let mut image = Image::new(width, self.whole.0[0].len() as u32 / width);
         for (layer, halves) in [("", &self.whole), ("lores", &self.indirect)] {
-            let mean: Vec<glam::Vec3> = halves.mean().into_iter().map(|v| glam::DVec3::from(v).as_vec3()).collect();
-            image.push_rgb(layer, &mean);
+            image.push_rgb(layer, &rounded(&halves.mean()));
         }
         image
     }

@@ -4,9 +4,10 @@ use std::path::Path;
 
 use glam::Vec3;
 
-use super::error::Plane;
+use super::error::{Plane, rounded};
 use crate::error::Result;
-use crate::image::{self, Image, Metadata, ViewTransform, WriteOptions, view};
+use crate::image::{self, Image, Metadata, ViewTransform, WriteOptions};
+use crate::srgb::srgb_decode;
 
 /// Relative difference that has the full colour in a difference image.
 pub const FULL_DIFFERENCE: f64 = 0.5;
@@ -49,12 +50,12 @@ fn diverging(x: f32) -> Vec3 {
     let white = Vec3::splat(0.96);
     let end = Vec3::from_array(ends.map(|v| v as f32 / 255.0));
     let encoded = white.lerp(end, x.abs().powf(0.7));
-    Vec3::from_array(encoded.to_array().map(view::srgb_decode))
+    Vec3::from_array(encoded.to_array().map(srgb_decode))
 }
 
 fn to_image(width: u32, radiance: &Plane) -> Image {
     let mut image = Image::new(width, radiance.len() as u32 / width);
-    image.push_rgb("", &radiance.iter().map(|v| glam::DVec3::from(*v).as_vec3()).collect::<Vec<_>>());
+    image.push_rgb("", &rounded(radiance));
     image
 }
 

@@ -18,6 +18,7 @@ mod specular;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
+use ::gsii::clock::Stopwatch;
 use report::{Case, Outcome, Row, table};
 
 /// Measures a case.
@@ -39,14 +40,6 @@ const KNOWN: &[(&str, &str)] = &[
     ),
     ("GSII-020", "one face in one of 16 solutions gets 8 % too little direct light; the cause is not found"),
 ];
-
-/// Processor time of this process so far, seconds; 0 where the system does not tell.
-fn processor_seconds() -> f64 {
-    // User and system time are the 14th and 15th field, in hundredths; the second field is a name in parentheses.
-    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
-    let fields = stat.rsplit(')').next().unwrap_or_default().split_whitespace().skip(11).take(2);
-    fields.filter_map(|f| f.parse::<f64>().ok()).sum::<f64>() / 100.0
-}
 
 fn recipe(id: &str) -> Option<Recipe> {
     let all = [
@@ -80,13 +73,13 @@ fn main() {
             bad.push(case.id.as_str());
             continue;
         };
-        let start = processor_seconds();
+        let start = Stopwatch::start();
         let mut outcome = Outcome::new(case);
         let measured = catch_unwind(AssertUnwindSafe(|| recipe(case, &mut outcome)));
         if measured.is_err() {
             outcome.holds("measured without a panic", false);
         }
-        let seconds = processor_seconds() - start;
+        let seconds = start.spent().cpu;
         let known = KNOWN.iter().find(|(id, _)| *id == case.id).map(|(_, reason)| *reason);
         let verdict = match (outcome.passes(), known) {
             (true, None) => "ok",

@@ -259,14 +259,18 @@ fn rad_010_concentric_spheres(case: &Case, out: &mut Outcome<'_>) {
     let mut model = Model::new();
     model.add("inner", ball(DVec3::ZERO, 0.5, 5), glow(0.2, 1.0));
     model.add("outer", flipped(ball(DVec3::ZERO, 1.0, 5)), grey(0.8));
-    let room = Room::new(model.finish());
-    let measured = radiosities(&room, &["inner", "outer"], &[1.0, 0.0], |seed| one_patch(1e-2, seed));
-    for (i, name) in ["inner", "outer"].into_iter().enumerate() {
+    two_surfaces(case, out, &Room::new(model.finish()), ["inner", "outer"], [0.2, 0.8], 1e-2);
+}
+
+/// Radiosity and irradiance of two surfaces of one patch each, of which the first emits 1.
+fn two_surfaces(case: &Case, out: &mut Outcome<'_>, room: &Room, names: [&str; 2], reflectances: [f64; 2], error: f64) {
+    let emission = [1.0, 0.0];
+    let measured = radiosities(room, &names, &emission, |seed| one_patch(error, seed));
+    let rel = case.tolerance("/pipeline/rel");
+    for (i, name) in names.into_iter().enumerate() {
         let (b, h) = (case.values("/B")[i], case.values("/H")[i]);
-        let rel = case.tolerance("/pipeline/rel");
         out.mean(&format!("B of {name}"), b, measured[i], rel * b);
-        let irradiance = (measured[i].mean - [1.0, 0.0][i]) / [0.2, 0.8][i];
-        out.relative(&format!("H of {name}"), h, irradiance, rel);
+        out.relative(&format!("H of {name}"), h, (measured[i].mean - emission[i]) / reflectances[i], rel);
     }
 }
 
@@ -491,14 +495,7 @@ fn rad_019_two_plates(case: &Case, out: &mut Outcome<'_>) {
     let mut model = Model::new();
     model.add("lower", level([0., 2.], [0., 1.], 0.0, true), glow(0.5, 1.0));
     model.add("upper", level([0., 2.], [0., 1.], 0.5, false), grey(0.9));
-    let room = Room::new(model.finish());
-    let measured = radiosities(&room, &["lower", "upper"], &[1.0, 0.0], |seed| one_patch(4e-3, seed));
-    for (i, name) in ["lower", "upper"].into_iter().enumerate() {
-        let (b, h) = (case.values("/B")[i], case.values("/H")[i]);
-        let rel = case.tolerance("/pipeline/rel");
-        out.mean(&format!("B of {name}"), b, measured[i], rel * b);
-        out.relative(&format!("H of {name}"), h, (measured[i].mean - [1.0, 0.0][i]) / [0.5, 0.9][i], rel);
-    }
+    two_surfaces(case, out, &Room::new(model.finish()), ["lower", "upper"], [0.5, 0.9], 4e-3);
 }
 
 fn rad_021_depth_cap(case: &Case, out: &mut Outcome<'_>) {

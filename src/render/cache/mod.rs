@@ -12,9 +12,10 @@ mod record;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::integrator::{Captured, FarField, Workspace, World};
+use super::integrator::{Captured, FarField, World};
 use super::path::{Arrival, Path};
 use super::view::ViewRays;
+use super::workspace::Workspace;
 use crate::backend::Ray;
 use crate::sampling::{hash_all, sobol};
 use crate::scene::Camera;

@@ -47,7 +47,7 @@ pub(super) struct Record {
     pub position: Vec3,
     /// Unit shading normal on the lit side.
     pub normal: Vec3,
-    /// Harmonic mean distance of what the hemisphere sees, bounded by neighbours and gradients; scene units.
+    /// Harmonic mean distance of what the hemisphere sees, scene units.
     pub distance: f32,
     /// Distance over which the record is used, scene units.
     pub reach: f32,
@@ -87,6 +87,8 @@ impl Record {
         // Columns: change of one band along the frame's axes
         let (mut rotation, mut translation) = (Mat3::ZERO, Mat3::ZERO);
         let outer = |axis: Vec3, value: Vec3| Mat3::from_cols(axis * value.x, axis * value.y, axis * value.z);
+        let cosines: Vec<f32> =
+            (0..=rings).map(|ring| (1.0 - boundary(ring) * boundary(ring)).max(0.0).sqrt()).collect();
         // Mean over each ring of the tangent of the angle with the normal: at the horizon its value in the middle is far off.
         let tangents: Vec<f32> = (0..rings)
             .map(|ring| {
@@ -112,9 +114,8 @@ impl Record {
                     let weight = TAU / sectors as f32 * s * (1.0 - s * s) / d;
                     translation += outer(outward, (here - radiance[at(ring - 1, sector)]) * weight);
                 }
-                let cosine = |ring: usize| (1.0 - boundary(ring) * boundary(ring)).max(0.0).sqrt();
                 let d = closest(at(ring, sector), at(ring, before));
-                let weight = cos * (cosine(ring) - cosine(ring + 1)) / (sin * d);
+                let weight = cos * (cosines[ring] - cosines[ring + 1]) / (sin * d);
                 translation += outer(around_before, (here - radiance[at(ring, before)]) * weight);
             }
         }

@@ -10,8 +10,8 @@ use rayon::prelude::*;
 use super::buffers::Buffers;
 use super::json::valid;
 use crate::image::{Data, Pixels, decode_texture};
-use crate::scene::texture::srgb_to_linear;
 use crate::scene::{SceneBuilder, Texels, Texture, TextureSlot, Wrap};
+use crate::srgb::srgb_decode;
 
 /// How the numbers of an image are meant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -90,7 +90,7 @@ fn texels(pixels: Pixels, coding: Coding) -> Texels {
         // Integers of more than eight bits are encoded all the same.
         (Data::F32(mut values), Coding::Color) if !pixels.floating_point => {
             for rgba in values.chunks_exact_mut(4) {
-                rgba[..3].iter_mut().for_each(|v| *v = srgb_to_linear(*v));
+                rgba[..3].iter_mut().for_each(|v| *v = srgb_decode(*v));
             }
             Texels::Float(values)
         }
