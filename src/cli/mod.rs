@@ -2,6 +2,7 @@
 
 pub mod compare;
 pub mod info;
+pub mod long;
 pub mod manual;
 pub mod merge;
 pub mod options;

@@ -7,16 +7,18 @@ use std::time::Duration;
 
 use clap::Args;
 
+use super::long::{Checkpoint, Kept, LongOptions};
 use super::options::{MethodOptions, SceneOptions, Talk, load, set_threads};
 use super::output::{OutputOptions, names};
 use super::outside::OutsideOptions;
 use crate::clock::Stopwatch;
 use crate::error::{Error, Result};
 use crate::image::Metadata;
+use crate::pipeline::identity::identity;
 use crate::pipeline::{Method, Prepared, Stats, choose_camera};
 use crate::progress::Progress;
-use crate::render::layers::{Layer, develop};
-use crate::render::{Region, RenderParams, Rendering, World, bias};
+use crate::render::layers::{Layer, develop, develop_with};
+use crate::render::{Region, RenderParams, Rendering, Session, World, bias};
 use crate::scene::{Camera, Scene};
 
 /// Pairs of paths that measure the bias when not said otherwise.
@@ -102,6 +104,8 @@ pub struct Options {
     #[arg(long, value_name = "FILE.json", help_heading = "Output")]
     stats: Option<PathBuf>,
     #[command(flatten)]
+    long: LongOptions,
+    #[command(flatten)]
     talk: Talk,
 }
 
@@ -112,6 +116,7 @@ pub struct Options {
 pub fn run(options: &Options) -> Result<ExitCode> {
     let start = Stopwatch::start();
     OutputOptions::check(&options.output.output)?;
+    options.long.check()?;
     set_threads(options.method.threads)?;
     let progress = options.talk.progress();
     stop_on_ctrl_c(&progress);
@@ -122,15 +127,17 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     let views = options.views(&scene)?;
     let params = views.iter().map(|view| options.render_params(&view.camera)).collect::<Result<Vec<_>>>()?;
     let cameras: Vec<Camera> = views.iter().map(|view| view.camera.clone()).collect();
+    // Before the preparation, which may take long: a checkpoint of something else is noticed at once.
+    let kept = views.iter().zip(&params).map(|(view, params)| options.begin(&scene, &cameras, view, params));
+    let kept = kept.collect::<Result<Vec<_>>>()?;
     let prepared = Prepared::for_cameras(scene, &cameras, options.method.settings(), &progress, &mut stats)?;
     for warning in &stats.warnings {
         log::warn!("{warning}");
     }
-    for (view, params) in views.iter().zip(&params) {
+    for ((view, params), kept) in views.iter().zip(&params).zip(kept) {
         // Times and counts of the preparation belong to every view.
         let mut stats = stats.clone();
-        if !options.render_view(&prepared, view, params, start, &progress, &mut stats)? {
-            options.talk.say("gsii: stopped before the first trial; nothing was written");
+        if !options.render_view(&prepared, view, params, kept, start, &progress, &mut stats)? {
             return Ok(ExitCode::FAILURE);
         }
         if progress.stopped() {
@@ -145,6 +152,7 @@ struct View {
     camera: Camera,
     outputs: Vec<PathBuf>,
     stats: Option<PathBuf>,
+    checkpoint: Option<PathBuf>,
 }
 
 /// The path with a camera's name before its extension.
@@ -163,7 +171,13 @@ impl Options {
     fn views(&self, scene: &Scene) -> Result<Vec<View>> {
         if self.scene.camera.as_deref() != Some(ALL_CAMERAS) {
             let camera = choose_camera(scene, self.scene.camera.as_deref())?.clone();
-            return Ok(vec![View { camera, outputs: self.output.output.clone(), stats: self.stats.clone() }]);
+            let checkpoint = self.long.checkpoint().map(Path::to_owned);
+            return Ok(vec![View {
+                camera,
+                outputs: self.output.output.clone(),
+                stats: self.stats.clone(),
+                checkpoint,
+            }]);
         }
         let harmless = |c: char| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' };
         let mut names: Vec<String> = Vec::new();
@@ -176,26 +190,43 @@ impl Options {
             let outputs: Vec<PathBuf> = self.output.output.iter().map(|path| of_camera(path, &name)).collect();
             OutputOptions::check(&outputs)?;
             let stats = self.stats.as_ref().map(|path| of_camera(path, &name));
-            views.push(View { camera: camera.clone(), outputs, stats });
+            let checkpoint = self.long.checkpoint().map(|path| of_camera(path, &name));
+            views.push(View { camera: camera.clone(), outputs, stats, checkpoint });
             names.push(name);
         }
         Ok(views)
     }
 
+    /// Where the rendering of a view starts, and where it is kept while it is not finished.
+    fn begin(&self, scene: &Scene, cameras: &[Camera], view: &View, params: &RenderParams) -> Result<Kept> {
+        let identity = || identity(scene, cameras, &view.camera, &self.method.settings(), params);
+        self.long.begin(&view.outputs[0], view.checkpoint.clone(), &identity, params)
+    }
+
     /// Renders and writes one view. False when it was stopped before the first trial.
+    #[expect(clippy::too_many_arguments, reason = "all that a run has")]
     fn render_view(
         &self,
         prepared: &Prepared,
         view: &View,
         params: &RenderParams,
+        kept: Kept,
         start: Stopwatch,
         progress: &Progress,
         stats: &mut Stats,
     ) -> Result<bool> {
         let camera = &view.camera;
-        let rendering = prepared.render(camera, params, progress);
+        let Kept { session, checkpoint } = kept;
+        let rendering = {
+            let mut stats = stats.clone();
+            let write = |session: &Session| self.write_partial(session, view, params, &mut stats);
+            let mut watchers = self.long.watchers(&view.outputs[0], checkpoint.as_ref(), write);
+            prepared.resume(camera, params, session, progress, Some(&mut watchers))
+        };
         stats.record_rendering(&rendering);
+        let advice = checkpoint.as_ref().map_or_else(String::new, Checkpoint::advice);
         if rendering.film.pixels().all(|p| p.hires.trials() == 0) {
+            self.talk.say(format!("gsii: stopped before the first trial; no image was written{advice}"));
             return Ok(false);
         }
         self.measure_bias(prepared, camera, params, &rendering, stats);
@@ -209,8 +240,20 @@ impl Options {
         if let Some(path) = &view.stats {
             write_stats(path, stats)?;
         }
-        self.summarise(&view.outputs, stats, rendering.stopped);
+        if let Some(checkpoint) = checkpoint.as_ref().filter(|_| !rendering.stopped) {
+            checkpoint.remove()?;
+        }
+        self.summarise(&view.outputs, stats, rendering.stopped.then_some(advice.as_str()));
         Ok(true)
+    }
+
+    /// Writes the images of a rendering that is not finished.
+    fn write_partial(&self, session: &Session, view: &View, params: &RenderParams, stats: &mut Stats) -> Result<()> {
+        let film = session.film();
+        stats.record_film(&film);
+        self.record_parameters(&view.camera, params, true, stats)?;
+        let developed = develop_with(&film, &session.picture_with(&film), self.layers());
+        self.output.write(&view.outputs, &developed, &metadata(stats))
     }
 
     fn render_params(&self, camera: &Camera) -> Result<RenderParams> {
@@ -285,7 +328,7 @@ impl Options {
             return;
         }
         let start = Stopwatch::start();
-        let world = World { cache: rendering.cache.as_ref(), ..prepared.world() };
+        let world = World { cache: rendering.cache.as_deref(), ..prepared.world() };
         let bias = bias::measure(&world, camera, params, self.measure_bias);
         stats.record_bias(&bias, &rendering.film);
         stats.record_time(start, |s| &mut s.bias);
@@ -319,13 +362,14 @@ impl Options {
         self.outside.record(map)
     }
 
-    fn summarise(&self, outputs: &[PathBuf], stats: &Stats, stopped: bool) {
+    /// `stopped` says what can be done about it.
+    fn summarise(&self, outputs: &[PathBuf], stats: &Stats, stopped: Option<&str>) {
         let s = &stats.seconds;
         let e = &stats.error;
         self.talk.say(format!(
             "{}{}: {:.1} s (load {:.1}, simplify {:.1}, build {:.1}, radiosity {:.1}, HIRES {:.1}, LORES {:.1})",
             names(outputs),
-            if stopped { " (stopped early, with the trials there were)" } else { "" },
+            stopped.map_or_else(String::new, |advice| format!(" (stopped early, with the trials there were{advice})")),
             s.total,
             s.load,
             s.simplify,

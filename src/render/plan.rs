@@ -1,7 +1,10 @@
 //! How many trials each tile gets in each pass: decided by a pilot, whose trials are not part of the image.
 
+use serde::{Deserialize, Serialize};
+
 use super::RenderParams;
-use super::film::{Film, Region, TILE, Tile};
+use super::film::{Region, TILE, Tile};
+use super::tally::Tally;
 use crate::sampling::hash;
 
 /// Trials of each pixel in the pilot, when the image has at least four times as many to spend.
@@ -11,7 +14,7 @@ const PILOT_TRIALS: u32 = 16;
 const DARK: f64 = 0.1;
 
 /// Trials of one tile's pixels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Allocation {
     /// In HIRES.
     pub hires: u32,
@@ -28,6 +31,22 @@ impl Allocation {
     /// The larger of both.
     pub fn most(&self) -> u32 {
         self.hires.max(self.lores)
+    }
+}
+
+/// What a rendering is to do.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Plan {
+    /// Trials of each of the film's tiles.
+    pub allocations: Vec<Allocation>,
+    /// What the pilot cost that decided it.
+    pub pilot: Tally,
+}
+
+impl Plan {
+    /// The same for every tile, without a pilot.
+    pub fn even(trials: u32, tiles: usize) -> Self {
+        Plan { allocations: vec![Allocation::even(trials); tiles], pilot: Tally::default() }
     }
 }
 
@@ -97,7 +116,7 @@ pub fn pilot_tiles(region: Region, params: &RenderParams) -> Vec<Tile> {
 ///
 /// Variances are pooled over a tile and, where larger, half of its neighbours': a pilot that missed a feature at the edge of one
 /// tile has seen it in the next.
-pub fn allocate(pilot: &[Tile], film: &Film, params: &RenderParams) -> Vec<Allocation> {
+pub fn allocate(pilot: &[Tile], film: &[Tile], params: &RenderParams) -> Vec<Allocation> {
     let grid = Grid::new(params);
     let mut of_tile: Vec<Option<Statistics>> = vec![None; (grid.across * grid.down) as usize];
     let (mut sum, mut sampled) = (0.0, 0);
@@ -132,7 +151,7 @@ pub fn allocate(pilot: &[Tile], film: &Film, params: &RenderParams) -> Vec<Alloc
         let rest = (target - dev_hires).max(0.5 * target);
         Allocation { hires: hires_trials, lores: trials(lores / (rest * rest)) }
     };
-    film.tiles.iter().map(one).collect()
+    film.iter().map(one).collect()
 }
 
 fn statistics(tile: &Tile) -> Statistics {
@@ -150,6 +169,7 @@ mod tests {
     use glam::Vec3;
 
     use super::*;
+    use crate::render::Film;
 
     fn params() -> RenderParams {
         RenderParams {
@@ -186,9 +206,9 @@ mod tests {
     #[test]
     fn quiet_tiles_get_the_minimum_and_noisy_ones_what_the_error_asks_for() {
         let film = Film::new(24, 8);
-        let quiet = allocate(&pilot(0.0).tiles, &film, &params());
+        let quiet = allocate(&pilot(0.0).tiles, &film.tiles, &params());
         assert!(quiet.iter().all(|a| *a == Allocation { hires: 4, lores: 4 }));
-        let noisy = allocate(&pilot(1.0).tiles, &film, &params());
+        let noisy = allocate(&pilot(1.0).tiles, &film.tiles, &params());
         // Variance 16/15 a trial, radiance about 2: HIRES needs 1.07 / 0.2^2 = 27 trials.
         assert_eq!(noisy[1].hires, 32);
         assert!(noisy[1].lores > noisy[1].hires);
@@ -198,7 +218,7 @@ mod tests {
     #[test]
     fn black_images_stop_at_the_minimum() {
         let film = Film::new(24, 8);
-        assert!(allocate(&film.tiles, &film, &params()).iter().all(|a| a.most() == 4));
+        assert!(allocate(&film.tiles, &film.tiles, &params()).iter().all(|a| a.most() == 4));
     }
 
     /// Whatever part is asked for, a tile gets what it gets in the whole image.
@@ -220,14 +240,14 @@ mod tests {
             tiles
         };
         let whole = Film::new(size[0], size[1]);
-        let plan = allocate(&fill(pilot_tiles(Region::whole(size), &params)), &whole, &params);
+        let plan = allocate(&fill(pilot_tiles(Region::whole(size), &params)), &whole.tiles, &params);
         assert!(plan.iter().any(|a| a.hires != plan[0].hires), "tiles differ");
         for (low, high) in [([0, 0], [350, 200]), ([333, 77], [334, 78]), ([696, 392], [700, 400])] {
             let region = Region { low, high };
             let part = Film::of(region, size);
             let pilot = pilot_tiles(region, &params);
             assert!(pilot.len() < whole.tiles.len(), "less is to be rendered");
-            let of_part = allocate(&fill(pilot), &part, &params);
+            let of_part = allocate(&fill(pilot), &part.tiles, &params);
             for (tile, allocation) in part.tiles.iter().zip(of_part) {
                 let index = whole.tiles.iter().position(|t| t.origin == tile.origin).unwrap();
                 assert_eq!(allocation, plan[index]);

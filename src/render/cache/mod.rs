@@ -11,6 +11,7 @@ mod record;
 
 use glam::Vec3;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::integrator::{Captured, FarField, World};
 use super::path::{Arrival, Path};
@@ -51,42 +52,73 @@ const LEAST_PIXELS: f32 = 3.0;
 const STREAM: u32 = 0x6361_6368;
 
 /// Records of indirect light.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(from = "Unindexed")]
 pub struct IrradianceCache {
     records: Vec<Record>,
+    /// Passes of [`PASSES`] that are done.
+    passes: usize,
+    #[serde(skip)]
     index: Index,
 }
 
+/// A cache in a file: the index follows from the rest.
+#[derive(Deserialize)]
+struct Unindexed {
+    records: Vec<Record>,
+    passes: usize,
+}
+
+impl From<Unindexed> for IrradianceCache {
+    fn from(Unindexed { records, passes }: Unindexed) -> Self {
+        IrradianceCache { index: Index::new(&records), records, passes }
+    }
+}
+
 impl IrradianceCache {
-    /// Fills a cache for one view. The same on any number of threads, unless `over` says that it must end.
-    pub fn new(
+    /// Whether all passes are done.
+    pub fn is_full(&self) -> bool {
+        self.passes == PASSES.len()
+    }
+
+    /// Does the next pass for a view. The same on any number of threads. Where `over` says that it must end, nothing is changed and
+    /// the answer is false.
+    pub fn fill(
+        &mut self,
         world: &World<'_>,
         camera: &Camera,
         size: [u32; 2],
         seed: u32,
         over: &(dyn Fn() -> bool + Sync),
-    ) -> Self {
-        let Some(far) = &world.far else { return IrradianceCache::default() };
+    ) -> bool {
+        let (Some(far), Some((spacing, strata))) = (&world.far, PASSES.get(self.passes).copied()) else {
+            self.passes = PASSES.len();
+            return true;
+        };
         let view = ViewRays::new(camera, size, hash_all(&[seed, STREAM]));
-        let mut cache = IrradianceCache::default();
-        for (pass, (spacing, strata)) in PASSES.into_iter().enumerate() {
-            let places = cache.places(world, &view, size, spacing, pass as u32);
-            let fresh: Vec<Option<Record>> = places
-                .par_iter()
-                .enumerate()
-                .map_init(Workspace::default, |ws, (number, place)| {
-                    let stream = hash_all(&[seed, STREAM, pass as u32, number as u32]);
-                    if over() { None } else { gather(world, far, ws, place, strata, stream) }
-                })
-                .collect();
-            cache.records.extend(fresh.into_iter().flatten());
-            cache.settle(far.r_thresh);
-            log::debug!("irradiance cache: {} places at every {spacing} pixels, {} records", places.len(), cache.len());
+        let pass = self.passes as u32;
+        let places = self.places(world, &view, size, spacing, pass);
+        let fresh: Vec<Option<Record>> = places
+            .par_iter()
+            .enumerate()
+            .map_init(Workspace::default, |ws, (number, place)| {
+                let stream = hash_all(&[seed, STREAM, pass, number as u32]);
+                if over() { None } else { gather(world, far, ws, place, strata, stream) }
+            })
+            .collect();
+        if over() {
+            return false;
         }
-        cache.check();
-        let refuse = cache.records.iter().filter(|r| r.refuses).count();
-        log::debug!("irradiance cache: {refuse} of {} records refuse", cache.len());
-        cache
+        self.records.extend(fresh.into_iter().flatten());
+        self.settle(far.r_thresh);
+        self.passes += 1;
+        log::debug!("irradiance cache: {} places at every {spacing} pixels, {} records", places.len(), self.len());
+        if self.is_full() {
+            self.check();
+            let refuse = self.records.iter().filter(|r| r.refuses).count();
+            log::debug!("irradiance cache: {refuse} of {} records refuse", self.len());
+        }
+        true
     }
 
     /// Diffuse places at the pixels of a grid that the records so far do not cover.

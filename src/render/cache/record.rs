@@ -3,6 +3,7 @@
 use std::f32::consts::{FRAC_1_PI, TAU};
 
 use glam::{Mat3, Vec3};
+use serde::{Deserialize, Serialize};
 
 use crate::sampling::{basis, sobol};
 
@@ -42,7 +43,7 @@ const MOST_CHANGE: f32 = 0.5;
 const IN_FRONT: f32 = 0.1;
 
 /// Indirect light at one point of a surface, and how it changes around it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(super) struct Record {
     pub position: Vec3,
     /// Unit shading normal on the lit side.

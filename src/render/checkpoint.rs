@@ -1,0 +1,258 @@
+//! A [`Session`] in a file: a rendering goes on where it was, in another process and to the same bits.
+//!
+//! The file is a row of frames after a line that says what it is. A frame is its length, what it holds, and a checksum: what a
+//! rendering belongs to, the state of its stages, then tile after tile.
+
+use std::fs::File;
+use std::io::{self, BufReader, BufWriter, Read, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use xxhash_rust::xxh3::xxh3_64;
+
+use super::film::{Pixel, Tile};
+use super::plan::{Plan, pilot_tiles};
+use super::session::{Session, SharedTiles};
+use super::tally::Tally;
+use super::{IrradianceCache, RenderParams};
+use crate::clock::Spent;
+use crate::error::{Error, Result};
+
+/// First line of the file; the number changes with the format.
+const MAGIC: &[u8] = b"gsii checkpoint 1\n";
+
+/// Longest value that a message quotes, characters.
+const QUOTED: usize = 48;
+
+/// What a rendering is of: names and values of all that its pixels depend on.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Identity(pub Vec<(String, String)>);
+
+impl Identity {
+    /// How `other` differs, as a part of a sentence; `None` when it does not.
+    fn difference(&self, other: &Identity) -> Option<String> {
+        let value = |all: &Identity, name: &str| all.0.iter().find(|(n, _)| n == name).map(|(_, value)| value.clone());
+        let mut names: Vec<&String> = self.0.iter().chain(&other.0).map(|(name, _)| name).collect();
+        names.dedup();
+        let mut found: Vec<String> = Vec::new();
+        for name in names {
+            let (there, here) = (value(self, name), value(other, name));
+            let short = |v: &Option<String>| v.clone().filter(|v| v.len() <= QUOTED);
+            let words = match (short(&there), short(&here)) {
+                _ if there == here => continue,
+                (Some(there), Some(here)) => format!("{name} is {there} there and {here} here"),
+                _ => format!("{name} is another"),
+            };
+            if !found.contains(&words) {
+                found.push(words);
+            }
+        }
+        (!found.is_empty()).then(|| found.join(", "))
+    }
+}
+
+/// What comes before the tiles.
+#[derive(Serialize, Deserialize)]
+struct Stages {
+    cache: Arc<IrradianceCache>,
+    /// Number of the pilot's tiles, which come before the film's.
+    pilot: usize,
+    plan: Option<Plan>,
+    spent: Spent,
+    filling: Spent,
+}
+
+/// What is known of a tile; without pixels where there are no trials.
+#[derive(Serialize)]
+struct TileOut<'a> {
+    next: u32,
+    dropped: u64,
+    tally: Tally,
+    pixels: &'a [Pixel],
+}
+
+/// The same, read.
+#[derive(Deserialize)]
+struct TileIn {
+    next: u32,
+    dropped: u64,
+    tally: Tally,
+    pixels: Vec<Pixel>,
+}
+
+/// Where the file is written before it gets its name. Always the same name, so that a process which was killed leaves one at most.
+pub fn unfinished(path: &Path) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".part");
+    name.into()
+}
+
+/// Removes a checkpoint, where there is one.
+///
+/// # Errors
+/// When it is there and cannot be removed.
+pub fn remove(path: &Path) -> Result<()> {
+    for file in [path.to_owned(), unfinished(path)] {
+        match std::fs::remove_file(&file) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => {
+                return Err(Error::Output { path: file, reason: format!("it cannot be removed: {error}") });
+            }
+            _ => (),
+        }
+    }
+    Ok(())
+}
+
+/// Writes a session, also while threads work on it. The file appears under its name when it is complete and on the disk.
+///
+/// # Errors
+/// When the system refuses; then an older checkpoint is still there.
+pub fn write(path: &Path, identity: &Identity, session: &Session) -> Result<()> {
+    let part = unfinished(path);
+    let written = write_to(&part, identity, session).and_then(|()| std::fs::rename(&part, path));
+    written.map_err(|error| {
+        // What is left of it is of no use; that it cannot be written is said anyway.
+        let _ = std::fs::remove_file(&part);
+        Error::Output { path: path.to_owned(), reason: error.to_string() }
+    })
+}
+
+fn write_to(path: &Path, identity: &Identity, session: &Session) -> io::Result<()> {
+    let mut frames = Writer { file: BufWriter::with_capacity(1 << 20, File::create(path)?), buffer: Vec::new() };
+    frames.file.write_all(MAGIC)?;
+    frames.put(identity)?;
+    frames.put(&Stages {
+        cache: Arc::clone(&session.cache),
+        pilot: session.pilot.len(),
+        plan: session.plan.clone(),
+        spent: session.spent(),
+        filling: session.filling,
+    })?;
+    for tile in session.pilot.iter().chain(session.tiles.iter()) {
+        let pixels = if tile.next > 0 { tile.pixels.as_slice() } else { &[] };
+        frames.encode(&TileOut { next: tile.next, dropped: tile.dropped, tally: tile.tally, pixels })?;
+        // The disk may be slow; whoever works on the tile shall not wait for it.
+        drop(tile);
+        frames.write()?;
+    }
+    let file = frames.file.into_inner().map_err(|error| error.into_error())?;
+    file.sync_all()
+}
+
+struct Writer {
+    file: BufWriter<File>,
+    buffer: Vec<u8>,
+}
+
+impl Writer {
+    fn put(&mut self, value: &impl Serialize) -> io::Result<()> {
+        self.encode(value)?;
+        self.write()
+    }
+
+    fn encode(&mut self, value: &impl Serialize) -> io::Result<()> {
+        self.buffer.clear();
+        self.buffer = postcard::to_extend(value, std::mem::take(&mut self.buffer)).map_err(io::Error::other)?;
+        Ok(())
+    }
+
+    fn write(&mut self) -> io::Result<()> {
+        self.file.write_all(&(self.buffer.len() as u64).to_le_bytes())?;
+        self.file.write_all(&self.buffer)?;
+        self.file.write_all(&xxh3_64(&self.buffer).to_le_bytes())
+    }
+}
+
+/// Reads a session of the rendering that `identity` and `params` say.
+///
+/// # Errors
+/// When the file cannot be read, is damaged, or belongs to another rendering; the message says how that differs.
+pub fn read(path: &Path, identity: &Identity, params: &RenderParams) -> Result<Session> {
+    let refuse = |reason: String| Error::Input { path: path.to_owned(), reason };
+    let file = File::open(path).map_err(|error| refuse(error.to_string()))?;
+    let left = file.metadata().map_err(|error| refuse(error.to_string()))?.len();
+    let mut frames = Reader { file: BufReader::with_capacity(1 << 20, file), left, buffer: Vec::new() };
+    let mut magic = [0; MAGIC.len()];
+    if frames.fill(&mut magic).is_err() || magic != MAGIC {
+        return Err(refuse("this is no checkpoint of this version of gsii; render without --resume".to_owned()));
+    }
+    let damaged = |what: String| refuse(format!("the checkpoint is damaged ({what}); render without --resume"));
+    let there: Identity = frames.get().map_err(damaged)?;
+    if let Some(difference) = there.difference(identity) {
+        return Err(refuse(format!(
+            "the checkpoint is of another rendering: {difference}; go on with what it was begun with, or render without --resume"
+        )));
+    }
+    session(&mut frames, params).map_err(damaged)
+}
+
+fn session(frames: &mut Reader, params: &RenderParams) -> std::result::Result<Session, String> {
+    let stages: Stages = frames.get()?;
+    let mut session = Session::new(params);
+    let pilot = if stages.pilot > 0 { pilot_tiles(params.region(), params) } else { Vec::new() };
+    let planned = stages.plan.as_ref().is_none_or(|plan| plan.allocations.len() == session.tiles.len());
+    if stages.pilot != pilot.len() || !planned {
+        return Err("tiles are missing".to_owned());
+    }
+    session.pilot = tiles(frames, pilot)?;
+    session.tiles = tiles(frames, std::mem::take(&mut session.tiles).into_tiles())?;
+    if frames.left > 0 {
+        return Err("it goes on after its end".to_owned());
+    }
+    session.cache = stages.cache;
+    session.plan = stages.plan;
+    (session.earlier, session.filling) = (stages.spent, stages.filling);
+    Ok(session)
+}
+
+fn tiles(frames: &mut Reader, mut empty: Vec<Tile>) -> std::result::Result<SharedTiles, String> {
+    for tile in &mut empty {
+        let TileIn { next, dropped, tally, pixels } = frames.get()?;
+        if next > 0 && pixels.len() != tile.pixels.len() {
+            return Err("a tile has another size".to_owned());
+        }
+        if next > 0 {
+            tile.pixels = pixels;
+        }
+        (tile.next, tile.dropped, tile.tally) = (next, dropped, tally);
+    }
+    Ok(SharedTiles::new(empty))
+}
+
+struct Reader {
+    file: BufReader<File>,
+    /// Bytes that the file still has, which no length in it may exceed.
+    left: u64,
+    buffer: Vec<u8>,
+}
+
+impl Reader {
+    fn fill(&mut self, bytes: &mut [u8]) -> std::result::Result<(), String> {
+        self.left = self.left.checked_sub(bytes.len() as u64).ok_or("it ends too early")?;
+        self.file.read_exact(bytes).map_err(|error| error.to_string())
+    }
+
+    fn number(&mut self) -> std::result::Result<u64, String> {
+        let mut bytes = [0; 8];
+        self.fill(&mut bytes)?;
+        Ok(u64::from_le_bytes(bytes))
+    }
+
+    fn get<T: DeserializeOwned>(&mut self) -> std::result::Result<T, String> {
+        let length = self.number()?;
+        if length > self.left {
+            return Err("it ends too early".to_owned());
+        }
+        let mut buffer = std::mem::take(&mut self.buffer);
+        buffer.resize(length as usize, 0);
+        self.fill(&mut buffer)?;
+        if self.number()? != xxh3_64(&buffer) {
+            return Err("a checksum is wrong".to_owned());
+        }
+        let value = postcard::from_bytes(&buffer).map_err(|error| error.to_string())?;
+        self.buffer = buffer;
+        Ok(value)
+    }
+}
