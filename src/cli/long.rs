@@ -80,51 +80,53 @@ impl LongOptions {
         self.checkpoint.as_deref()
     }
 
-    /// What is kept of the rendering of an image, and where it goes on. `named` is the checkpoint where an option says it.
+    /// Where the unfinished rendering of `image` is kept: in `named` where an option says so. `None` when it is not.
     ///
     /// # Errors
-    /// A checkpoint that is damaged, or of another rendering.
-    pub fn begin(
+    /// A checkpoint that is to be continued but is damaged, or of another rendering than `identity` says.
+    pub fn keep(
         &self,
         image: &Path,
-        named: Option<PathBuf>,
-        identity: &dyn Fn() -> Result<Identity>,
-        params: &RenderParams,
-    ) -> Result<Kept> {
-        let begun = Session::new(params);
+        named: Option<&Path>,
+        identity: impl FnOnce() -> Result<Identity>,
+    ) -> Result<Option<Checkpoint>> {
         if self.checkpoint_every == 0.0 {
-            return Ok(Kept { session: begun, checkpoint: None });
+            return Ok(None);
         }
         let beside = || {
             let mut name = OsString::from(image);
             name.push(EXTENSION);
             PathBuf::from(name)
         };
-        let path = named.unwrap_or_else(beside);
-        let identity = identity()?;
-        let session = match (self.resume, path.exists()) {
-            (true, true) => checkpoint::read(&path, &identity, params)?,
-            (true, false) => {
-                log::warn!("there is no checkpoint {}: the rendering starts from the beginning", path.display());
-                begun
-            }
+        let kept = Checkpoint { path: named.map_or_else(beside, Path::to_owned), identity: identity()? };
+        let name = kept.path.display();
+        match (self.resume, kept.path.exists()) {
+            (true, true) => checkpoint::check(&kept.path, &kept.identity)?,
+            (true, false) => log::warn!("there is no checkpoint {name}: the rendering starts from the beginning"),
             (false, true) => {
-                log::warn!(
-                    "{} is the checkpoint of an unfinished rendering, which --resume would go on with; it will be replaced",
-                    path.display()
-                );
-                begun
+                log::warn!("{name} is of an unfinished rendering, which --resume would go on with; it will be replaced")
             }
-            (false, false) => begun,
-        };
-        Ok(Kept { session, checkpoint: Some(Checkpoint { path, identity }) })
+            (false, false) => (),
+        }
+        Ok(Some(kept))
+    }
+
+    /// Where a rendering starts.
+    ///
+    /// # Errors
+    /// As [`LongOptions::keep`].
+    pub fn session(&self, kept: Option<&Checkpoint>, params: &RenderParams) -> Result<Session> {
+        match kept {
+            Some(kept) if self.resume && kept.path.exists() => checkpoint::read(&kept.path, &kept.identity, params),
+            _ => Ok(Session::new(params)),
+        }
     }
 
     /// Everybody who looks at the rendering of `image` (a file's name); `write` writes the images so far.
     pub fn watchers<'a>(
         &self,
         image: &Path,
-        checkpoint: Option<&Checkpoint>,
+        kept: Option<&Checkpoint>,
         write: impl FnMut(&Session) -> Result<()> + Send + 'a,
     ) -> Vec<Box<dyn Watcher + 'a>> {
         let mut watchers: Vec<Box<dyn Watcher + 'a>> = Vec::new();
@@ -134,7 +136,7 @@ impl LongOptions {
                 Err(error) => log::warn!("no tev listens at {address}: {error}; the rendering goes on without"),
             }
         }
-        if let Some(Checkpoint { path, identity }) = checkpoint {
+        if let Some(Checkpoint { path, identity }) = kept {
             let every = Duration::from_secs_f64(self.checkpoint_every);
             watchers.push(Box::new(Saver::new(path, identity.clone(), every)));
         }
@@ -144,14 +146,6 @@ impl LongOptions {
         }
         watchers
     }
-}
-
-/// A rendering to be done, and where it is kept until then.
-pub struct Kept {
-    /// Where it starts.
-    pub session: Session,
-    /// Its checkpoint, where there is to be one.
-    pub checkpoint: Option<Checkpoint>,
 }
 
 /// A file that keeps a rendering.

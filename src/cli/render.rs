@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use clap::Args;
 
-use super::long::{Checkpoint, Kept, LongOptions};
+use super::long::{Checkpoint, LongOptions};
 use super::options::{MethodOptions, SceneOptions, Talk, load, set_threads};
 use super::output::{OutputOptions, names};
 use super::outside::OutsideOptions;
@@ -20,6 +20,7 @@ use crate::progress::Progress;
 use crate::render::layers::{Layer, develop, develop_with};
 use crate::render::{Region, RenderParams, Rendering, Session, World, bias};
 use crate::scene::{Camera, Scene};
+use crate::unfinished;
 
 /// Pairs of paths that measure the bias when not said otherwise.
 const BIAS_SAMPLES: u32 = 1 << 15;
@@ -128,8 +129,8 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     let params = views.iter().map(|view| options.render_params(&view.camera)).collect::<Result<Vec<_>>>()?;
     let cameras: Vec<Camera> = views.iter().map(|view| view.camera.clone()).collect();
     // Before the preparation, which may take long: a checkpoint of something else is noticed at once.
-    let kept = views.iter().zip(&params).map(|(view, params)| options.begin(&scene, &cameras, view, params));
-    let kept = kept.collect::<Result<Vec<_>>>()?;
+    let keep = |(view, params)| options.keep(&scene, &cameras, view, params);
+    let kept = views.iter().zip(&params).map(keep).collect::<Result<Vec<_>>>()?;
     let prepared = Prepared::for_cameras(scene, &cameras, options.method.settings(), &progress, &mut stats)?;
     for warning in &stats.warnings {
         log::warn!("{warning}");
@@ -137,7 +138,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     for ((view, params), kept) in views.iter().zip(&params).zip(kept) {
         // Times and counts of the preparation belong to every view.
         let mut stats = stats.clone();
-        if !options.render_view(&prepared, view, params, kept, start, &progress, &mut stats)? {
+        if !options.render_view(&prepared, view, params, kept.as_ref(), start, &progress, &mut stats)? {
             return Ok(ExitCode::FAILURE);
         }
         if progress.stopped() {
@@ -197,10 +198,16 @@ impl Options {
         Ok(views)
     }
 
-    /// Where the rendering of a view starts, and where it is kept while it is not finished.
-    fn begin(&self, scene: &Scene, cameras: &[Camera], view: &View, params: &RenderParams) -> Result<Kept> {
+    /// Where the rendering of a view is kept while it is not finished; `cameras` are those that the scene is prepared for.
+    fn keep(
+        &self,
+        scene: &Scene,
+        cameras: &[Camera],
+        view: &View,
+        params: &RenderParams,
+    ) -> Result<Option<Checkpoint>> {
         let identity = || identity(scene, cameras, &view.camera, &self.method.settings(), params);
-        self.long.begin(&view.outputs[0], view.checkpoint.clone(), &identity, params)
+        self.long.keep(&view.outputs[0], view.checkpoint.as_deref(), identity)
     }
 
     /// Renders and writes one view. False when it was stopped before the first trial.
@@ -210,21 +217,21 @@ impl Options {
         prepared: &Prepared,
         view: &View,
         params: &RenderParams,
-        kept: Kept,
+        kept: Option<&Checkpoint>,
         start: Stopwatch,
         progress: &Progress,
         stats: &mut Stats,
     ) -> Result<bool> {
         let camera = &view.camera;
-        let Kept { session, checkpoint } = kept;
+        let session = self.long.session(kept, params)?;
         let rendering = {
             let mut stats = stats.clone();
             let write = |session: &Session| self.write_partial(session, view, params, &mut stats);
-            let mut watchers = self.long.watchers(&view.outputs[0], checkpoint.as_ref(), write);
+            let mut watchers = self.long.watchers(&view.outputs[0], kept, write);
             prepared.resume(camera, params, session, progress, Some(&mut watchers))
         };
         stats.record_rendering(&rendering);
-        let advice = checkpoint.as_ref().map_or_else(String::new, Checkpoint::advice);
+        let advice = kept.map_or_else(String::new, Checkpoint::advice);
         if rendering.film.pixels().all(|p| p.hires.trials() == 0) {
             self.talk.say(format!("gsii: stopped before the first trial; no image was written{advice}"));
             return Ok(false);
@@ -240,8 +247,8 @@ impl Options {
         if let Some(path) = &view.stats {
             write_stats(path, stats)?;
         }
-        if let Some(checkpoint) = checkpoint.as_ref().filter(|_| !rendering.stopped) {
-            checkpoint.remove()?;
+        if let Some(kept) = kept.filter(|_| !rendering.stopped) {
+            kept.remove()?;
         }
         self.summarise(&view.outputs, stats, rendering.stopped.then_some(advice.as_str()));
         Ok(true)
@@ -396,6 +403,7 @@ pub(super) fn stop_on_ctrl_c(progress: &Progress) {
     // Fails only when a handler exists already (several runs in one process): the first one stays.
     let _ = ctrlc::set_handler(move || {
         if progress.stopped() {
+            unfinished::remove_all();
             std::process::exit(1);
         }
         progress.stop();
@@ -433,12 +441,7 @@ fn metadata(stats: &Stats) -> Metadata {
 }
 
 fn write_stats(path: &Path, stats: &Stats) -> Result<()> {
-    let failed = |error: &dyn std::fmt::Display| Error::Output { path: path.to_owned(), reason: error.to_string() };
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let file = tempfile::NamedTempFile::new_in(folder).map_err(|e| failed(&e))?;
-    serde_json::to_writer_pretty(&file, stats).map_err(|e| failed(&e))?;
-    file.persist(path).map_err(|e| failed(&e.error))?;
-    Ok(())
+    unfinished::write(path, |file| Ok(serde_json::to_writer_pretty(file, stats)?))
 }
 
 /// Largest resident set of this process so far, bytes; 0 where the system does not tell.

@@ -19,6 +19,7 @@ use super::tally::Tally;
 use super::{IrradianceCache, RenderParams};
 use crate::clock::Spent;
 use crate::error::{Error, Result};
+use crate::unfinished::Listed;
 
 /// First line of the file; the number changes with the format.
 const MAGIC: &[u8] = b"gsii checkpoint 1\n";
@@ -111,6 +112,7 @@ pub fn remove(path: &Path) -> Result<()> {
 /// When the system refuses; then an older checkpoint is still there.
 pub fn write(path: &Path, identity: &Identity, session: &Session) -> Result<()> {
     let part = unfinished(path);
+    let _listed = Listed::new(&part);
     let written = write_to(&part, identity, session).and_then(|()| std::fs::rename(&part, path));
     written.map_err(|error| {
         // What is left of it is of no use; that it cannot be written is said anyway.
@@ -165,27 +167,29 @@ impl Writer {
     }
 }
 
+/// Finds out whether [`read`] would go on with the rendering that `identity` says, as far as that can be told without reading all.
+///
+/// # Errors
+/// As [`read`].
+pub fn check(path: &Path, identity: &Identity) -> Result<()> {
+    Reader::open(path, identity).map(drop)
+}
+
 /// Reads a session of the rendering that `identity` and `params` say.
 ///
 /// # Errors
 /// When the file cannot be read, is damaged, or belongs to another rendering; the message says how that differs.
 pub fn read(path: &Path, identity: &Identity, params: &RenderParams) -> Result<Session> {
-    let refuse = |reason: String| Error::Input { path: path.to_owned(), reason };
-    let file = File::open(path).map_err(|error| refuse(error.to_string()))?;
-    let left = file.metadata().map_err(|error| refuse(error.to_string()))?.len();
-    let mut frames = Reader { file: BufReader::with_capacity(1 << 20, file), left, buffer: Vec::new() };
-    let mut magic = [0; MAGIC.len()];
-    if frames.fill(&mut magic).is_err() || magic != MAGIC {
-        return Err(refuse("this is no checkpoint of this version of gsii; render without --resume".to_owned()));
-    }
-    let damaged = |what: String| refuse(format!("the checkpoint is damaged ({what}); render without --resume"));
-    let there: Identity = frames.get().map_err(damaged)?;
-    if let Some(difference) = there.difference(identity) {
-        return Err(refuse(format!(
-            "the checkpoint is of another rendering: {difference}; go on with what it was begun with, or render without --resume"
-        )));
-    }
-    session(&mut frames, params).map_err(damaged)
+    let mut frames = Reader::open(path, identity)?;
+    session(&mut frames, params).map_err(|what| damaged(path, &what))
+}
+
+fn refused(path: &Path, reason: String) -> Error {
+    Error::Input { path: path.to_owned(), reason }
+}
+
+fn damaged(path: &Path, what: &str) -> Error {
+    refused(path, format!("the checkpoint is damaged ({what}); render without --resume"))
 }
 
 fn session(frames: &mut Reader, params: &RenderParams) -> std::result::Result<Session, String> {
@@ -229,6 +233,30 @@ struct Reader {
 }
 
 impl Reader {
+    /// Reads as far as the stages.
+    fn open(path: &Path, identity: &Identity) -> Result<Reader> {
+        let opened = File::open(path).and_then(|file| Ok((file.metadata()?.len(), file)));
+        let (left, file) = opened.map_err(|error| refused(path, error.to_string()))?;
+        let mut frames = Reader { file: BufReader::with_capacity(1 << 20, file), left, buffer: Vec::new() };
+        let mut magic = [0; MAGIC.len()];
+        if frames.fill(&mut magic).is_err() || magic != MAGIC {
+            return Err(refused(
+                path,
+                "this is no checkpoint of this version of gsii; render without --resume".to_owned(),
+            ));
+        }
+        let there: Identity = frames.get().map_err(|what| damaged(path, &what))?;
+        match there.difference(identity) {
+            None => Ok(frames),
+            Some(difference) => Err(refused(
+                path,
+                format!(
+                    "the checkpoint is of another rendering: {difference}; go on with what it was begun with, or render without --resume"
+                ),
+            )),
+        }
+    }
+
     fn fill(&mut self, bytes: &mut [u8]) -> std::result::Result<(), String> {
         self.left = self.left.checked_sub(bytes.len() as u64).ok_or("it ends too early")?;
         self.file.read_exact(bytes).map_err(|error| error.to_string())
