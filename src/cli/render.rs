@@ -17,7 +17,7 @@ use crate::image::Metadata;
 use crate::pipeline::identity::identity;
 use crate::pipeline::{Method, Prepared, Stats, choose_camera};
 use crate::progress::Progress;
-use crate::render::layers::{Layer, develop, develop_with};
+use crate::render::layers::{Layer, develop};
 use crate::render::{Region, RenderParams, Rendering, Session, World, bias};
 use crate::scene::{Camera, Scene};
 use crate::unfinished;
@@ -259,7 +259,7 @@ impl Options {
         let film = session.film();
         stats.record_film(&film);
         self.record_parameters(&view.camera, params, true, stats)?;
-        let developed = develop_with(&film, &session.picture_with(&film), self.layers());
+        let developed = develop(&film, self.layers());
         self.output.write(&view.outputs, &developed, &metadata(stats))
     }
 

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use xxhash_rust::xxh3::xxh3_64;
 
 use super::film::{Pixel, Tile};
-use super::plan::{Plan, pilot_tiles};
+use super::plan::{Plan, other_tiles};
 use super::session::{Session, SharedTiles};
 use super::tally::Tally;
 use super::{IrradianceCache, RenderParams};
@@ -58,8 +58,8 @@ impl Identity {
 #[derive(Serialize, Deserialize)]
 struct Stages {
     cache: Arc<IrradianceCache>,
-    /// Number of the pilot's tiles, which come before the film's.
-    pilot: usize,
+    /// Number of tiles beside the film's, which come first.
+    others: usize,
     plan: Option<Plan>,
     spent: Spent,
     filling: Spent,
@@ -127,12 +127,12 @@ fn write_to(path: &Path, identity: &Identity, session: &Session) -> io::Result<(
     frames.put(identity)?;
     frames.put(&Stages {
         cache: Arc::clone(&session.cache),
-        pilot: session.pilot.len(),
+        others: session.others.len(),
         plan: session.plan.clone(),
         spent: session.spent(),
         filling: session.filling,
     })?;
-    for tile in session.pilot.iter().chain(session.tiles.iter()) {
+    for tile in session.others.iter().chain(session.tiles.iter()) {
         let pixels = if tile.next > 0 { tile.pixels.as_slice() } else { &[] };
         frames.encode(&TileOut { next: tile.next, dropped: tile.dropped, tally: tile.tally, pixels })?;
         // The disk may be slow; whoever works on the tile shall not wait for it.
@@ -195,12 +195,15 @@ fn damaged(path: &Path, what: &str) -> Error {
 fn session(frames: &mut Reader, params: &RenderParams) -> std::result::Result<Session, String> {
     let stages: Stages = frames.get()?;
     let mut session = Session::new(params);
-    let pilot = if stages.pilot > 0 { pilot_tiles(params.region(), params) } else { Vec::new() };
-    let planned = stages.plan.as_ref().is_none_or(|plan| plan.allocations.len() == session.tiles.len());
-    if stages.pilot != pilot.len() || !planned {
+    let others = if stages.others > 0 { other_tiles(params.region(), params) } else { Vec::new() };
+    let planned = stages.plan.as_ref().is_none_or(|plan| {
+        let sizes = session.tiles.iter().map(|tile| tile.pixels.len());
+        plan.allocations.iter().map(Vec::len).eq(sizes)
+    });
+    if stages.others != others.len() || !planned {
         return Err("tiles are missing".to_owned());
     }
-    session.pilot = tiles(frames, pilot)?;
+    session.others = tiles(frames, others)?;
     session.tiles = tiles(frames, std::mem::take(&mut session.tiles).into_tiles())?;
     if frames.left > 0 {
         return Err("it goes on after its end".to_owned());

@@ -117,14 +117,18 @@ impl FarField<'_> {
 
 /// A batch of trials of one tile.
 #[derive(Clone, Copy, Debug)]
-pub struct Batch {
+pub struct Batch<'a> {
+    /// Numbers of the pixels.
+    pub pixels: &'a [u32],
     /// Number of the first trial.
     pub first: u32,
     /// Number of trials for each pixel.
     pub trials: u32,
     /// Passes to feed.
     pub passes: Passes,
-    /// Seed; pilots use another one than the image.
+    /// Whether to record what view rays meet first.
+    pub features: bool,
+    /// Seed of the image.
     pub seed: u32,
 }
 
@@ -135,25 +139,24 @@ impl<'a> World<'a> {
         ws: &mut Workspace,
         camera: &Camera,
         image_size: [u32; 2],
-        batch: Batch,
-        features: bool,
+        batch: Batch<'_>,
         tile: &mut Tile,
     ) {
-        let pixels = tile.pixels.len();
-        let trials = pixels * batch.trials as usize;
+        let trials = batch.pixels.len() * batch.trials as usize;
         ws.start(trials);
         let view = ViewRays::new(camera, image_size, batch.seed);
-        for i in 0..pixels as u32 {
-            ws.paths.extend(view.paths(tile.pixel(i), batch.first, batch.trials, i * batch.trials));
+        for (place, &pixel) in (0..).zip(batch.pixels) {
+            ws.paths.extend(view.paths(tile.pixel(pixel), batch.first, batch.trials, place * batch.trials));
         }
         ws.features.clear();
-        if features {
+        if batch.features {
             ws.features.resize(trials, Feature::default());
         }
         self.run(ws, batch.passes, None);
-        for (i, pixel) in tile.pixels.iter_mut().enumerate() {
+        for (place, &pixel) in batch.pixels.iter().enumerate() {
+            let pixel = &mut tile.pixels[pixel as usize];
             for t in 0..batch.trials {
-                let trial = i * batch.trials as usize + t as usize;
+                let trial = place * batch.trials as usize + t as usize;
                 let (h, l) = (ws.hires[trial], ws.lores[trial]);
                 if !(h.is_finite() && l.is_finite()) {
                     tile.dropped += 1;

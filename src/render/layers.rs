@@ -90,15 +90,10 @@ impl FromStr for Layer {
 
 /// The image `HIRES + LORES` in `R,G,B`, and layers beside it.
 pub fn develop(film: &Film, layers: &[Layer]) -> Image {
-    develop_with(film, &film.pixels().map(Pixel::radiance).collect::<Vec<_>>(), layers)
-}
-
-/// As [`develop`], with another picture in `R,G,B`: one value for each pixel, row by row.
-pub fn develop_with(film: &Film, picture: &[Vec3], layers: &[Layer]) -> Image {
     let mut image = Image::new(film.width, film.height);
     let rgb = |value: &dyn Fn(&Pixel) -> Vec3| film.pixels().map(value).collect::<Vec<_>>();
     let scalar = |value: &dyn Fn(&Pixel) -> f32| film.pixels().map(value).collect::<Vec<_>>();
-    image.push_rgb("", picture);
+    image.push_rgb("", &rgb(&Pixel::radiance));
     for layer in layers {
         let name = layer.name();
         match layer {

@@ -85,7 +85,7 @@ pub struct Rendering {
     pub film: Film,
     /// Rays traced.
     pub rays: RayCounts,
-    /// Wall-clock time of both passes, shared out by the time that threads spent in them; the pilot is in both.
+    /// Wall-clock time of both passes, shared out by the time that threads spent in them.
     pub times: PassTimes,
     /// The same for the time of all cores together.
     pub cpu_times: PassTimes,
@@ -128,12 +128,12 @@ pub fn render_rounds(
     let world = &World { cache: wants_cache(world, params).then_some(&cache), ..*world };
     let renderer = Renderer { world, camera, params, over: &over };
     let mut film = params.film();
-    let plan = Plan::even(params.max_trials, film.tiles.len());
+    let plan = Plan::even(params.max_trials, film.tiles.iter());
     let bar =
         progress.stage("rendering", u64::from(params.max_trials) * u64::from(params.width) * u64::from(params.height));
     for range in doubling(params.min_trials, params.max_trials) {
         let tiles = SharedTiles::new(std::mem::take(&mut film.tiles));
-        let complete = renderer.round(&tiles, &plan.allocations, range.clone(), params.seed, &|n| bar.inc(n));
+        let complete = renderer.round(&tiles, &plan.allocations, range.end, &|n| bar.inc(n));
         let Tally { rays, times } = tiles.tally();
         film.tiles = tiles.into_tiles();
         if !complete || !watch(&Round { film: &film, trials: range.end, rays, times }) {
@@ -145,8 +145,8 @@ pub fn render_rounds(
 
 /// Renders an image.
 ///
-/// A pilot estimates the variance around each tile and decides how many trials each pass gets there; its trials are thrown
-/// away. Deciding on trials that are kept would bias the image towards dark (see `docs/method.md`).
+/// The first trials of the pixels around each pixel decide how many trials each pass gets there; its own have no part in that, which would
+/// bias the image towards dark (see `docs/method.md`).
 pub fn render(world: &World<'_>, camera: &Camera, params: &RenderParams, progress: &Progress) -> Rendering {
     resume(world, camera, params, Session::new(params), progress, None)
 }

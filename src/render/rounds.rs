@@ -1,4 +1,4 @@
-//! The stages of a rendering: irradiance cache, pilot, and the film in rounds that double its trials.
+//! The stages of a rendering: irradiance cache, first trials and a plan, and the film in rounds that double its trials.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -16,11 +16,10 @@ use super::workspace::Workspace;
 use super::{BATCH_TRIALS, RenderParams};
 use crate::clock::Stopwatch;
 use crate::progress::Progress;
-use crate::sampling::hash_all;
 use crate::scene::Camera;
 
-/// Keeps the pilot's random numbers apart from the image's.
-const PILOT: u32 = 0x7069_6c6f;
+/// Paths of a tile that are traced as one batch where few of its pixels want more trials.
+const FEW_PATHS: u32 = 256;
 
 /// Numbers of trials in rounds that double from `first` to `most`, so that there is a whole image early and prefixes of the point
 /// sets stay well distributed.
@@ -64,34 +63,39 @@ pub(super) struct Renderer<'a> {
 }
 
 impl Renderer<'_> {
-    /// Decides how many trials each tile of the film gets, where the session has not: by a pilot if they may differ. False when the
-    /// pilot was cut short.
+    /// Decides how many trials each pixel of the film gets, where the session has not: by the first trials, if they may differ. False
+    /// when it was cut short.
     pub fn plan(&self, session: &mut Session, progress: &Progress, watcher: &mut Option<&mut dyn Watcher>) -> bool {
         let params = self.params;
         if session.plan.is_some() {
             return true;
         }
         if params.min_trials == params.max_trials {
-            session.plan = Some(Plan::even(params.min_trials, session.tiles.len()));
+            session.plan = Some(Plan::even(params.min_trials, params.film().tiles.iter()));
             return true;
         }
-        if session.pilot.is_empty() {
-            session.pilot = SharedTiles::new(plan::pilot_tiles(params.region(), params));
+        if session.others.is_empty() {
+            session.others = SharedTiles::new(plan::other_tiles(params.region(), params));
         }
-        let trials = plan::pilot_trials(params);
-        let all = vec![Allocation::even(trials); session.pilot.len()];
-        let stage = progress.stage("pilot", 0);
-        let seed = hash_all(&[params.seed, PILOT]);
-        let complete = watched(session, watcher, || self.round(&session.pilot, &all, 0..trials, seed, &|_| {}));
-        stage.finish_and_clear();
+        let first = plan::first_trials(params);
+        let weigh = |tiles: &SharedTiles, trials: fn(&Tile, u32) -> u32| -> u64 {
+            tiles.iter().map(|tile| u64::from(trials(&tile, first)) * tile.pixels.len() as u64).sum()
+        };
+        let weigh_all = |trials| weigh(&session.tiles, trials) + weigh(&session.others, trials);
+        let bar = progress.stage("first trials", weigh_all(|_, first| first));
+        bar.inc(weigh_all(|tile, first| tile.next.min(first)));
+        bar.reset_eta();
+        let round = |tiles: &SharedTiles| {
+            let all = Plan::even(first, tiles.to_vec().iter());
+            self.round(tiles, &all.allocations, first, &|n| bar.inc(n))
+        };
+        let complete = watched(session, watcher, || round(&session.tiles) && round(&session.others));
+        bar.finish_and_clear();
         if complete {
-            if watcher.is_some() {
-                session.keep_preview();
-            }
-            let tally = session.pilot.tally();
-            let pilot = std::mem::take(&mut session.pilot).into_tiles();
-            let film = params.film().tiles;
-            session.plan = Some(Plan { allocations: plan::allocate(&pilot, &film, params), pilot: tally });
+            let others = std::mem::take(&mut session.others);
+            let tally = others.tally();
+            let allocations = plan::allocate(&session.tiles.to_vec(), &others.into_tiles(), params);
+            session.plan = Some(Plan { allocations, others: tally });
         }
         complete
     }
@@ -99,49 +103,46 @@ impl Renderer<'_> {
     /// Carries out the plan of a session. False when it was cut short.
     pub fn expose(&self, session: &Session, progress: &Progress, watcher: &mut Option<&mut dyn Watcher>) -> bool {
         let Some(plan) = &session.plan else { return false };
-        let weight = |tile: &Tile, trials: u32| u64::from(trials) * tile.pixels.len() as u64;
+        let trials = |all: &[Allocation], limit: u32| all.iter().map(|a| u64::from(a.most().min(limit))).sum::<u64>();
         let tiles = || plan.allocations.iter().zip(session.tiles.iter());
-        let bar = progress.stage("rendering", tiles().map(|(a, tile)| weight(&tile, a.most())).sum());
-        bar.inc(tiles().map(|(a, tile)| weight(&tile, tile.next.min(a.most()))).sum());
+        let bar = progress.stage("rendering", tiles().map(|(all, _)| trials(all, u32::MAX)).sum());
+        bar.inc(tiles().map(|(all, tile)| trials(all, tile.next)).sum());
         bar.reset_eta();
-        let most = plan.allocations.iter().map(Allocation::most).max().unwrap_or(0);
-        let round = |range| self.round(&session.tiles, &plan.allocations, range, self.params.seed, &|n| bar.inc(n));
+        let most = plan.allocations.iter().flatten().map(Allocation::most).max().unwrap_or(0);
+        let round = |range: Range<u32>| self.round(&session.tiles, &plan.allocations, range.end, &|n| bar.inc(n));
         let complete = watched(session, watcher, || doubling(BATCH_TRIALS, most).all(round));
         bar.finish_and_clear();
         complete
     }
 
-    /// Adds the trials with numbers in `range` to every tile whose allocation has them, but for those that it has already. False when
-    /// it was cut short.
+    /// Adds the planned trials with numbers below `end` to every tile, but for those that it has already. False when it was cut
+    /// short.
     pub fn round(
         &self,
         tiles: &SharedTiles,
-        plan: &[Allocation],
-        range: Range<u32>,
-        seed: u32,
+        plan: &[Vec<Allocation>],
+        end: u32,
         advance: &(dyn Fn(u64) + Sync),
     ) -> bool {
         let size = [self.params.width, self.params.height];
-        let work = |ws: &mut Workspace, (number, allocation): (usize, &Allocation)| {
+        let work = |ws: &mut Workspace, (number, plan): (usize, &Vec<Allocation>)| {
             // Others look at the tile meanwhile: what is worked on is a copy.
             let mut tile = tiles.get(number).clone();
-            for (trials, passes) in allocation.segments(tile.next.max(range.start)..range.end) {
-                let mut first = trials.start;
-                while first < trials.end {
-                    if (self.over)() {
-                        return false;
-                    }
-                    let count = BATCH_TRIALS.min(trials.end - first);
-                    let batch = Batch { first, trials: count, passes, seed };
-                    (ws.counts, ws.times) = Default::default();
-                    let features = self.params.features && passes.hires;
-                    self.world.render_tile(ws, self.camera, size, batch, features, &mut tile);
-                    first += count;
-                    tile.next = first;
-                    tile.tally += Tally { rays: ws.counts, times: ws.times };
-                    tiles.get(number).clone_from(&tile);
-                    advance(u64::from(count) * tile.pixels.len() as u64);
+            while let Some(slice) = Slice::next(plan, tile.next, end) {
+                if (self.over)() {
+                    return false;
                 }
+                (ws.counts, ws.times) = Default::default();
+                for (passes, pixels) in &slice.pixels {
+                    let (first, trials, seed) = (tile.next, slice.trials, self.params.seed);
+                    let features = self.params.features && passes.hires;
+                    let batch = Batch { pixels, first, trials, passes: *passes, features, seed };
+                    self.world.render_tile(ws, self.camera, size, batch, &mut tile);
+                    advance(u64::from(slice.trials) * pixels.len() as u64);
+                }
+                tile.next += slice.trials;
+                tile.tally += Tally { rays: ws.counts, times: ws.times };
+                tiles.get(number).clone_from(&tile);
             }
             true
         };
@@ -151,14 +152,32 @@ impl Renderer<'_> {
     }
 }
 
-impl Allocation {
-    /// The parts of a range of trial numbers that this allocation has, and the passes they feed.
-    fn segments(&self, range: Range<u32>) -> impl Iterator<Item = (Range<u32>, Passes)> + use<> {
-        let both = self.hires.min(self.lores);
-        let single = if self.hires > self.lores { Passes::HIRES } else { Passes::LORES };
-        [(range.start..range.end.min(both), Passes::BOTH), (range.start.max(both)..range.end.min(self.most()), single)]
-            .into_iter()
-            .filter(|(r, _)| !r.is_empty())
+/// The next trials of a tile: as many for all of its pixels that want any.
+struct Slice {
+    trials: u32,
+    /// The pixels that feed both passes, HIRES alone and LORES alone.
+    pixels: [(Passes, Vec<u32>); 3],
+}
+
+impl Slice {
+    /// From trial `first` on, at most up to `end`; `None` when no pixel wants more.
+    fn next(plan: &[Allocation], first: u32, end: u32) -> Option<Slice> {
+        let with = |passes: Passes| {
+            let wants = move |a: &Allocation| {
+                Passes { hires: a.hires > first, lores: a.lores > first } == passes && first < end
+            };
+            let pixels: Vec<u32> = (0..).zip(plan).filter(|(_, a)| wants(a)).map(|(i, _)| i).collect();
+            (passes, pixels)
+        };
+        let pixels = [Passes::BOTH, Passes::HIRES, Passes::LORES].map(with);
+        let count: u32 = pixels.iter().map(|(_, list)| list.len() as u32).sum();
+        // No pixel is to be overtaken by the limits of its passes.
+        let limits = plan.iter().flat_map(|a| [a.hires, a.lores]).filter(|&limit| limit > first);
+        let limit = limits.min().unwrap_or(first).min(end);
+        (count > 0).then(|| {
+            let trials = BATCH_TRIALS.max((FEW_PATHS / count).next_multiple_of(BATCH_TRIALS));
+            Slice { trials: trials.min(limit - first), pixels }
+        })
     }
 }
 
@@ -178,5 +197,27 @@ mod tests {
             }
         }
         assert_eq!(doubling(16, 0).count(), 0);
+    }
+
+    #[test]
+    fn slices_bring_every_pixel_what_is_planned_for_it() {
+        let of = |hires, lores| Allocation { hires, lores };
+        let plan = [of(16, 16), of(64, 16), of(16, 100), of(8, 8), of(512, 3)];
+        let mut done = [of(0, 0); 5];
+        let mut first = 0;
+        for end in [4, 16, 32, 512] {
+            while let Some(slice) = Slice::next(&plan, first, end) {
+                for (passes, pixels) in slice.pixels {
+                    for i in pixels {
+                        let done = &mut done[i as usize];
+                        done.hires += if passes.hires { slice.trials } else { 0 };
+                        done.lores += if passes.lores { slice.trials } else { 0 };
+                    }
+                }
+                first += slice.trials;
+                assert!(first <= end);
+            }
+        }
+        assert_eq!(done, plan);
     }
 }

@@ -8,6 +8,7 @@ use glam::Vec3;
 use tev_client::{PacketCreateImage, PacketUpdateImage, TevClient};
 
 use super::{Moment, Rhythm, Watcher};
+use crate::render::film::Pixel;
 use crate::render::session::Session;
 
 /// Time between two updates.
@@ -97,7 +98,7 @@ impl Watcher for TevViewer {
         let Some(client) = &mut self.client else { return };
         let (name, shown) = (&self.name, &mut self.shown);
         let sent = self.rhythm.beat(|| {
-            let picture = session.picture();
+            let picture: Vec<Vec3> = session.film().pixels().map(Pixel::radiance).collect();
             update(client, name, session.region().size(), &picture, shown)?;
             *shown = picture;
             Ok::<_, io::Error>(())
