@@ -374,17 +374,15 @@ impl<'a> World<'a> {
     /// Samples light for what was met, and shades it.
     fn shade_all(&self, ws: &mut Workspace, passes: Passes, capture: &mut Option<&mut Vec<Captured>>) {
         self.lights.sample_all(self.scene, &ws.lit, &mut ws.lights);
-        let mut next = 0;
-        for i in 0..ws.met.len() {
-            let met = ws.met[i];
-            let mut light = None;
-            if met.lit {
-                light = ws.lights[next];
-                next += 1;
-            }
-            self.shade(ws, &met, light.as_ref(), passes, capture);
+        let (mut met, mut lights) = (std::mem::take(&mut ws.met), std::mem::take(&mut ws.lights));
+        let mut sampled = lights.drain(..);
+        for met in &met {
+            let light = if met.lit { sampled.next().flatten() } else { None };
+            self.shade(ws, met, light.as_ref(), passes, capture);
         }
-        ws.met.clear();
+        drop(sampled);
+        met.clear();
+        (ws.met, ws.lights) = (met, lights);
         ws.lit.clear();
     }
 
@@ -397,7 +395,7 @@ impl<'a> World<'a> {
         passes: Passes,
         capture: &mut Option<&mut Vec<Captured>>,
     ) {
-        let &Met { hit, look_up, point, .. } = met;
+        let &Met { ref hit, look_up, ref point, .. } = met;
         let path = ws.paths[met.path as usize];
         let trial = path.trial as usize;
         let outgoing = -path.ray.direction;
@@ -408,11 +406,11 @@ impl<'a> World<'a> {
             None if path.gathers => self.gather_lobes,
             None => Lobes { least_roughness: 0.0, ..self.gather_lobes },
         };
-        let bsdf = Bsdf::new(self.scene, &point, outgoing, lobes);
+        let bsdf = Bsdf::new(self.scene, point, outgoing, lobes);
 
         let emission = bsdf.emission();
         if emission != Vec3::ZERO {
-            let radiance = path.throughput * emission * self.emission_share(&path, &hit);
+            let radiance = path.throughput * emission * self.emission_share(&path, hit);
             let sum = if path.gathers { &mut ws.lores[trial] } else { &mut ws.hires[trial] };
             *sum += radiance;
         }
@@ -430,7 +428,7 @@ impl<'a> World<'a> {
         }
 
         if let Some(light) = light {
-            shine(ws, &path, &point, &bsdf, light);
+            shine(ws, &path, point, &bsdf, light);
         }
 
         // Share of paths that gather the rest when the diffuse part came from the cache.
@@ -473,7 +471,7 @@ impl<'a> World<'a> {
         }
         let throughput = path.throughput / (1.0 - choose_high);
         if let (Some(triangle), Some(far)) = (look_up, &self.far) {
-            ws.lores[trial] += throughput * far.reflected(&Hit { triangle, ..hit }, path.ray.direction);
+            ws.lores[trial] += throughput * far.reflected(&Hit { triangle, ..*hit }, path.ray.direction);
             return;
         }
         if !goes_on {
@@ -503,7 +501,7 @@ impl<'a> World<'a> {
         match (path.gathers, capture) {
             (false, Some(captured)) => {
                 let diffuse = bsdf.albedo_diffuse() != Vec3::ZERO;
-                captured.push(Captured { path: next, point, normal: facing, diffuse });
+                captured.push(Captured { path: next, point: *point, normal: facing, diffuse });
             }
             _ => ws.next.push(next),
         }
