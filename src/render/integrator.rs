@@ -50,7 +50,7 @@ const CERTAIN_DEPTH: u32 = 32;
 const CERTAIN_SURVIVAL: f32 = 0.999;
 
 /// Points that are shaded together: as many as stay close to the processor.
-const MET_AT_ONCE: usize = 64;
+const MET_AT_ONCE: usize = 256;
 
 /// Share of paths that gather rough reflection apart from diffuse, per unit of its albedo.
 const PATHS_PER_ALBEDO: f32 = 4.0;
