@@ -120,10 +120,9 @@ pub fn render_rounds(
 ) {
     let over = || progress.stopped();
     let mut cache = IrradianceCache::default();
-    while wants_cache(world, params) && !cache.is_full() {
-        if !cache.fill(world, camera, [params.width, params.height], params.seed, &over) {
-            return;
-        }
+    let size = [params.width, params.height];
+    if wants_cache(world, params) && !cache.fill(world, camera, size, params.seed, &over, &mut |_| {}) {
+        return;
     }
     let world = &World { cache: wants_cache(world, params).then_some(&cache), ..*world };
     let renderer = Renderer { world, camera, params, over: &over };
