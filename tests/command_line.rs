@@ -271,7 +271,7 @@ fn ctrl_c_writes_what_is_there_and_says_so() {
     assert!(stderr(&output).contains("stopped early"), "{}", stderr(&output));
     let read = image::read(&bench.path("a.exr")).unwrap();
     assert!(read.channel("trials.hires").unwrap().iter().any(|&t| t > 0.0));
-    assert_eq!(bench.files(), ["a.exr", "room.gltf"], "nothing half-written stays");
+    assert_eq!(bench.files(), ["a.exr", "a.exr.checkpoint", "room.gltf"], "nothing half-written stays");
 }
 
 #[test]
