@@ -286,9 +286,9 @@ fn partial_images_are_whole_files_and_change_nothing() {
 fn a_second_ctrl_c_ends_at_once_and_leaves_nothing_half_written() {
     let bench = Bench::new();
     // An image that takes a while to write.
-    let size = ["--width", "1400", "--height", "1000", "--spp", "1000000", "--method", "mcpt", "--compression", "piz"];
-    let mut child = bench.start(&[&size[..], &["-o", "a.exr", "--checkpoint-every", "86400"]].concat());
-    std::thread::sleep(Duration::from_millis(1500));
+    let size = ["--width", "700", "--height", "500", "--spp", "1000000", "--method", "mcpt", "--compression", "piz"];
+    let mut child = bench.start(&[&size[..], &["-o", "a.exr", "--checkpoint-every", "0.1"]].concat());
+    wait_for("a checkpoint", || bench.written("a.exr.checkpoint"));
     interrupt(&child);
     let writes = || bench.files().iter().any(|name| name.ends_with(".part") || name.starts_with(".gsii-"));
     wait_for("a file that is written", || (writes() || child.try_wait().unwrap().is_some()).then_some(()));
