@@ -287,3 +287,86 @@ impl Reader {
         Ok(value)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::render::Region;
+    use crate::sampling::unit;
+
+    fn params() -> RenderParams {
+        RenderParams {
+            width: 11,
+            height: 2,
+            region: Some(Region { low: [0, 0], high: [8, 2] }),
+            min_trials: 4,
+            max_trials: 64,
+            hires_error: 0.1,
+            lores_error: 0.1,
+            time_limit: None,
+            features: true,
+            interpolate: true,
+            seed: 0,
+        }
+    }
+
+    fn identity(width: u32) -> Identity {
+        Identity(vec![("width".to_owned(), width.to_string()), ("scene".to_owned(), "x".repeat(QUOTED + 1))])
+    }
+
+    /// A session of a part in its first trials, with odd numbers in one tile beside the film's and none in the film.
+    fn session() -> Session {
+        let mut session = Session::new(&params());
+        let mut others = other_tiles(params().region(), &params());
+        others[0].next = 16;
+        others[0].dropped = 3;
+        others[0].tally.rays.near = 1 << 40;
+        for (i, pixel) in others[0].pixels.iter_mut().enumerate() {
+            for (t, odd) in [f32::MIN_POSITIVE, 0.1, -0.0, 1e30, f32::from_bits(1)].into_iter().enumerate() {
+                pixel.hires.add(glam::Vec3::new(odd, unit(i as u32), 1.0 / 3.0), t % 2 == 0);
+                pixel.feature.depth += odd;
+            }
+        }
+        session.others = SharedTiles::new(others);
+        session
+    }
+
+    fn everything(session: &Session) -> String {
+        format!("{:?} {:?} {:?} {:?}", session.others, session.tiles, session.plan, session.cache)
+    }
+
+    #[test]
+    fn what_is_written_is_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.checkpoint");
+        let written = session();
+        write(&path, &identity(11), &written).unwrap();
+        assert_eq!(everything(&read(&path, &identity(11), &params()).unwrap()), everything(&written));
+        assert!(!unfinished(&path).exists());
+        let refused = read(&path, &identity(12), &params()).unwrap_err().to_string();
+        assert!(refused.contains("width is 11 there and 12 here") && !refused.contains("scene"), "{refused}");
+        remove(&path).unwrap();
+        remove(&path).unwrap();
+        assert!(check(&path, &identity(11)).is_err());
+    }
+
+    #[test]
+    fn every_damage_is_noticed() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.checkpoint");
+        write(&path, &identity(11), &session()).unwrap();
+        let whole = std::fs::read(&path).unwrap();
+        let refused = |bytes: &[u8]| {
+            std::fs::write(&path, bytes).unwrap();
+            read(&path, &identity(11), &params()).is_err()
+        };
+        assert!(!refused(&whole));
+        for i in 0..whole.len() {
+            let mut bytes = whole.clone();
+            bytes[i] ^= 1 << (i % 8);
+            assert!(refused(&bytes), "byte {i} is another");
+            assert!(refused(&whole[..i]), "it ends at byte {i}");
+        }
+        assert!(refused(&[&whole[..], &[0]].concat()), "it goes on");
+    }
+}

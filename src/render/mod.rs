@@ -91,7 +91,7 @@ pub struct Rendering {
     pub cpu_times: PassTimes,
     /// Whether it was stopped before all planned trials were done.
     pub stopped: bool,
-    /// What indirect light was interpolated from.
+    /// What indirect light was interpolated from, where the world did not bring it.
     pub cache: Option<Arc<IrradianceCache>>,
 }
 
@@ -120,12 +120,11 @@ pub fn render_rounds(
 ) {
     let over = || progress.stopped();
     let mut cache = IrradianceCache::default();
-    while wants_cache(world, params) && !cache.is_full() {
-        if !cache.fill(world, camera, [params.width, params.height], params.seed, &over) {
-            return;
-        }
+    let size = [params.width, params.height];
+    if wants_cache(world, params) && !cache.fill(world, camera, size, params.seed, &over, &mut |_| {}) {
+        return;
     }
-    let world = &World { cache: wants_cache(world, params).then_some(&cache), ..*world };
+    let world = &World { cache: wants_cache(world, params).then_some(&cache).or(world.cache), ..*world };
     let renderer = Renderer { world, camera, params, over: &over };
     let mut film = params.film();
     let plan = Plan::even(params.max_trials, film.tiles.iter());
@@ -169,7 +168,7 @@ pub fn resume(
         complete = complete && fill_cache(&mut session, world, camera, params, progress, &over, &mut watcher);
     }
     let cache = interpolates.then(|| Arc::clone(&session.cache));
-    let world = &World { cache: cache.as_deref(), ..*world };
+    let world = &World { cache: cache.as_deref().or(world.cache), ..*world };
     let renderer = Renderer { world, camera, params, over: &over };
     complete = complete && renderer.plan(&mut session, progress, &mut watcher);
     complete = complete && renderer.expose(&session, progress, &mut watcher);
@@ -179,7 +178,10 @@ pub fn resume(
     session.into_rendering(cache, !complete)
 }
 
-/// Whether indirect light is interpolated between places: where that is wanted and there is a far field beyond a near one.
+/// Whether places are needed that indirect light is interpolated between: where that is wanted, the world brings none, and there is
+/// a far field beyond a near one.
 fn wants_cache(world: &World<'_>, params: &RenderParams) -> bool {
-    params.interpolate && world.far.is_some_and(|far| far.r_thresh > 0.0 && far.r_thresh.is_finite())
+    params.interpolate
+        && world.cache.is_none()
+        && world.far.is_some_and(|far| far.r_thresh > 0.0 && far.r_thresh.is_finite())
 }

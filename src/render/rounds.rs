@@ -13,7 +13,7 @@ use super::session::{Session, SharedTiles};
 use super::tally::Tally;
 use super::watch::{Moment, Watcher, watched};
 use super::workspace::Workspace;
-use super::{BATCH_TRIALS, RenderParams};
+use super::{BATCH_TRIALS, IrradianceCache, RenderParams};
 use crate::clock::Stopwatch;
 use crate::progress::Progress;
 use crate::scene::Camera;
@@ -28,7 +28,7 @@ pub(super) fn doubling(first: u32, most: u32) -> impl Iterator<Item = Range<u32>
     std::iter::successors(next(0), move |range| next(range.end))
 }
 
-/// Fills the irradiance cache of a session. False when it was cut short: finished passes are kept.
+/// Fills the irradiance cache of a session. False when it was cut short: the records that are there are kept.
 pub(super) fn fill_cache(
     session: &mut Session,
     world: &World<'_>,
@@ -39,16 +39,21 @@ pub(super) fn fill_cache(
     watcher: &mut Option<&mut dyn Watcher>,
 ) -> bool {
     let stage = progress.stage("irradiance cache", 0);
-    let mut complete = true;
-    while complete && !session.cache.is_full() {
-        let start = Stopwatch::start();
-        let cache = Arc::make_mut(&mut session.cache);
-        complete = cache.fill(world, camera, [params.width, params.height], params.seed, over);
+    let before = session.filling;
+    let start = Stopwatch::start();
+    let mut cache = IrradianceCache::clone(&session.cache);
+    let keep = |session: &mut Session, cache: &IrradianceCache| {
+        session.cache = Arc::new(cache.clone());
+        session.filling = before;
         session.filling += start.spent();
+    };
+    let complete = cache.fill(world, camera, [params.width, params.height], params.seed, over, &mut |cache| {
         if let Some(watcher) = watcher.as_deref_mut().filter(|w| w.wait().is_zero()) {
+            keep(session, cache);
             watcher.look(session, Moment::Meanwhile);
         }
-    }
+    });
+    keep(session, &cache);
     stage.finish_and_clear();
     complete
 }

@@ -90,7 +90,7 @@ impl Session {
 
     /// Whether there is anything that would be lost.
     pub fn is_begun(&self) -> bool {
-        !self.cache.is_empty() || self.tiles.iter().any(|tile| tile.next > 0)
+        self.cache.is_begun() || self.tiles.iter().any(|tile| tile.next > 0)
     }
 
     /// The part of the image that is rendered.

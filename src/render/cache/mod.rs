@@ -48,6 +48,9 @@ const TOLERANCE: f32 = 0.2;
 /// Least reach in pixels.
 const LEAST_PIXELS: f32 = 3.0;
 
+/// Places at which light is gathered between two looks at what there is.
+const CHUNK: usize = 4096;
+
 /// Keeps the cache's random numbers apart from the image's.
 const STREAM: u32 = 0x6361_6368;
 
@@ -55,9 +58,13 @@ const STREAM: u32 = 0x6361_6368;
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(from = "Unindexed")]
 pub struct IrradianceCache {
+    /// Those of the passes that are done.
     records: Vec<Record>,
     /// Passes of [`PASSES`] that are done.
     passes: usize,
+    /// Those of the first `next` places of the pass after them.
+    fresh: Vec<Record>,
+    next: usize,
     #[serde(skip)]
     index: Index,
 }
@@ -67,11 +74,13 @@ pub struct IrradianceCache {
 struct Unindexed {
     records: Vec<Record>,
     passes: usize,
+    fresh: Vec<Record>,
+    next: usize,
 }
 
 impl From<Unindexed> for IrradianceCache {
-    fn from(Unindexed { records, passes }: Unindexed) -> Self {
-        IrradianceCache { index: Index::new(&records), records, passes }
+    fn from(Unindexed { records, passes, fresh, next }: Unindexed) -> Self {
+        IrradianceCache { index: Index::new(&records), records, passes, fresh, next }
     }
 }
 
@@ -81,8 +90,13 @@ impl IrradianceCache {
         self.passes == PASSES.len()
     }
 
-    /// Does the next pass for a view. The same on any number of threads. Where `over` says that it must end, nothing is changed and
-    /// the answer is false.
+    /// Whether there is anything in it.
+    pub fn is_begun(&self) -> bool {
+        self.passes > 0 || self.next > 0
+    }
+
+    /// Goes on filling the cache for a view until it is full. The same on any number of threads. `each` looks at what there is from
+    /// time to time. Ends with false, and with what there is, where `over` says so.
     pub fn fill(
         &mut self,
         world: &World<'_>,
@@ -90,33 +104,43 @@ impl IrradianceCache {
         size: [u32; 2],
         seed: u32,
         over: &(dyn Fn() -> bool + Sync),
+        each: &mut dyn FnMut(&Self),
     ) -> bool {
-        let (Some(far), Some((spacing, strata))) = (&world.far, PASSES.get(self.passes).copied()) else {
+        let Some(far) = &world.far else {
             self.passes = PASSES.len();
             return true;
         };
         let view = ViewRays::new(camera, size, hash_all(&[seed, STREAM]));
-        let pass = self.passes as u32;
-        let places = self.places(world, &view, size, spacing, pass);
-        let fresh: Vec<Option<Record>> = places
-            .par_iter()
-            .enumerate()
-            .map_init(Workspace::default, |ws, (number, place)| {
-                let stream = hash_all(&[seed, STREAM, pass, number as u32]);
-                if over() { None } else { gather(world, far, ws, place, strata, stream) }
-            })
-            .collect();
-        if over() {
-            return false;
-        }
-        self.records.extend(fresh.into_iter().flatten());
-        self.settle(far.r_thresh);
-        self.passes += 1;
-        log::debug!("irradiance cache: {} places at every {spacing} pixels, {} records", places.len(), self.len());
-        if self.is_full() {
-            self.check();
-            let refuse = self.records.iter().filter(|r| r.refuses).count();
-            log::debug!("irradiance cache: {refuse} of {} records refuse", self.len());
+        while let Some(&(spacing, strata)) = PASSES.get(self.passes) {
+            let pass = self.passes as u32;
+            let places = self.places(world, &view, size, spacing, pass);
+            while self.next < places.len() {
+                let chunk = self.next..(self.next + CHUNK).min(places.len());
+                let gathered: Vec<Option<Record>> = chunk
+                    .clone()
+                    .into_par_iter()
+                    .map_init(Workspace::default, |ws, number| {
+                        let stream = hash_all(&[seed, STREAM, pass, number as u32]);
+                        if over() { None } else { gather(world, far, ws, &places[number], strata, stream) }
+                    })
+                    .collect();
+                if over() {
+                    return false;
+                }
+                self.fresh.extend(gathered.into_iter().flatten());
+                self.next = chunk.end;
+                each(self);
+            }
+            self.records.append(&mut self.fresh);
+            self.next = 0;
+            self.settle(far.r_thresh);
+            self.passes += 1;
+            log::debug!("irradiance cache: {} places at every {spacing} pixels, {} records", places.len(), self.len());
+            if self.is_full() {
+                self.check();
+                let refuse = self.records.iter().filter(|r| r.refuses).count();
+                log::debug!("irradiance cache: {refuse} of {} records refuse", self.len());
+            }
         }
         true
     }

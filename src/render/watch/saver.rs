@@ -8,8 +8,8 @@ use crate::error::Result;
 use crate::render::checkpoint::{self, Identity};
 use crate::render::session::Session;
 
-/// Writing takes no more than one part in so many of the time.
-const PAUSE: u32 = 20;
+/// From one checkpoint to the next goes so many times what writing takes: most of that is waiting for the disk.
+const PAUSE: u32 = 4;
 
 /// Writes a [checkpoint] from time to time, and when work is cut short.
 pub struct Saver {
