@@ -74,6 +74,9 @@ pub struct MethodOptions {
     /// Threads [default: all]
     #[arg(long, value_name = "N", help_heading = "Run")]
     pub threads: Option<usize>,
+    /// Folder that keeps the simplified scene and the radiosity solution for later runs
+    #[arg(long, value_name = "DIR", help_heading = "Run")]
+    pub cache: Option<PathBuf>,
     /// Ray-tracing library
     #[arg(long, value_enum, default_value_t, help_heading = "Run")]
     pub backend: BackendKind,
@@ -126,6 +129,7 @@ impl MethodOptions {
             filter_glossy: self.filter_glossy,
             max_depth: self.max_depth.unwrap_or(default.max_depth),
             backend: self.backend,
+            cache: self.cache.clone(),
             threads: self.threads.unwrap_or(0),
             seed: self.seed,
             ..default

@@ -1,12 +1,16 @@
 //! From a scene to everything the renderer needs, and the record of what was done.
 
 pub mod auto;
+pub mod cache;
+mod far;
 pub mod settings;
 pub mod stats;
 pub mod validate;
 
 use std::sync::Arc;
 
+pub use cache::Cache;
+pub use far::Far;
 pub use settings::{BackendKind, GeometryKind, Method, Settings};
 pub use stats::Stats;
 
@@ -17,11 +21,12 @@ use crate::clock::Stopwatch;
 use crate::error::{Error, Result};
 use crate::lighting::Lights;
 use crate::progress::Progress;
-use crate::radiosity::{self, RadiosityParams, RadiosityScene, Solution};
-use crate::render::{self, FarField, Nearness, RenderParams, Rendering, Round, World};
+use crate::radiosity::RadiosityParams;
+use crate::render::{self, FarField, RenderParams, Rendering, Round, World};
 use crate::scene::{Camera, Scene};
 use crate::shading::Lobes;
-use crate::simplify::{self, Simplified, SimplifiedGeometry, SimplifyParams, TriangleSource};
+use crate::simplify::{self, Simplified, SimplifyParams};
+use far::Kept;
 
 /// A scene, prepared for one method: acceleration structures, simplified scene, radiosity solution.
 pub struct Prepared {
@@ -35,22 +40,6 @@ pub struct Prepared {
     pub far: Option<Far>,
     /// Settings with every automatic choice filled in.
     pub settings: Settings,
-}
-
-/// The far field's parts; see [`FarField`].
-pub struct Far {
-    /// How the simplification came about; `None` where the geometry is complete (PMM).
-    pub simplified: Option<Simplified>,
-    /// The triangles that radiosity was solved on.
-    pub geometry: SimplifiedGeometry,
-    /// The same, for rays.
-    pub rays: Box<dyn RayScene>,
-    /// Radiosities.
-    pub solution: Solution,
-    /// See [`FarField::plain`].
-    pub plain: Vec<bool>,
-    /// Where near parts of gather rays need the detailed scene.
-    pub nearness: Option<Nearness>,
 }
 
 impl Prepared {
@@ -155,58 +144,6 @@ impl Prepared {
     }
 }
 
-impl Far {
-    fn new(
-        scene: &Arc<Scene>,
-        lights: &Lights,
-        backend: &dyn RayBackend,
-        settings: &Settings,
-        progress: &Progress,
-        stats: &mut Stats,
-    ) -> Result<Far> {
-        let start = Stopwatch::start();
-        let simplified = simplify::simplify(scene, backend, &settings.simplify_params(), progress)?;
-        stats.record_simplified(&simplified);
-        let complete = settings.complete_geometry();
-        let geometry = if complete {
-            SimplifiedGeometry::complete(scene, &simplified.surface_of_triangle)
-        } else {
-            simplified.geometry.clone()
-        };
-        stats.record_time(start, |s| &mut s.simplify);
-
-        let start = Stopwatch::start();
-        let rays = geometry.build(scene, backend)?;
-        let nearness = (!complete).then(|| {
-            let reach = 1.5 * settings.r_thresh();
-            let clusters = simplified.clusters.iter().map(|c| c.bounds.union(c.equivalent_box.bounds()));
-            let dropped = simplified.surfaces.iter().filter(|s| s.class.is_isolated()).map(|s| s.bounds);
-            Nearness::new(scene.mesh.bounds, clusters.chain(dropped), reach)
-        });
-        stats.record_time(start, |s| &mut s.build);
-
-        let start = Stopwatch::start();
-        let clusters: &[_] = if complete { &[] } else { &simplified.clusters };
-        let input = RadiosityScene { scene, lights, geometry: &geometry, clusters, rays: rays.as_ref() };
-        let solution = radiosity::solve(&input, &settings.radiosity_params(), progress)?;
-        stats.record_time(start, |s| &mut s.radiosity);
-        stats.record_solution(&solution);
-        let plain = geometry.sources.iter().map(|source| is_plain(scene, source)).collect();
-        Ok(Far { simplified: (!complete).then_some(simplified), geometry, rays, solution, plain, nearness })
-    }
-}
-
-/// Whether all that leaves a triangle of the far field's geometry is in the radiosity solution.
-fn is_plain(scene: &Scene, source: &TriangleSource) -> bool {
-    match *source {
-        TriangleSource::BoxFace { .. } => true,
-        TriangleSource::Scene { triangle } => {
-            let material = scene.material(triangle);
-            !material.is_emitter() && !material.may_be_sharp()
-        }
-    }
-}
-
 /// Simplifies a scene and does nothing else; gives the settings with every automatic choice filled in.
 ///
 /// # Errors
@@ -223,7 +160,9 @@ pub fn simplify_only(
     if settings.r_thresh.is_none() || settings.patch_size.is_none() {
         settings = automatic(scene, camera, settings)?;
     }
-    let simplified = simplify::simplify(scene, backend.as_ref(), &settings.simplify_params(), progress)?;
+    let mut kept = Kept::open(&settings, scene, backend.as_ref())?;
+    let simplified = kept.simplify(scene, backend.as_ref(), &settings.simplify_params(), progress)?;
+    stats.cache = kept.used();
     stats.record_simplified(&simplified);
     Ok((simplified, settings))
 }

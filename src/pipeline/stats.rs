@@ -3,6 +3,7 @@
 use serde::Serialize;
 use serde_json::{Map, Value};
 
+use super::cache::Fetched;
 use crate::clock::Stopwatch;
 use crate::radiosity::Solution;
 use crate::render::{Film, Rendering, bias::Bias};
@@ -27,12 +28,23 @@ pub struct Stats {
     pub error: Errors,
     /// Everything needed to repeat the run.
     pub parameters: Map<String, Value>,
+    /// Where the preparation came from; `None` without a cache folder.
+    pub cache: Option<CacheUse>,
     /// Energy balance of the radiosity solution, W per band.
     pub ledger: Option<crate::radiosity::Ledger>,
     /// Largest memory use of the process, bytes.
     pub peak_rss_bytes: u64,
     /// What the user should know.
     pub warnings: Vec<String>,
+}
+
+/// Where the preparation came from; `None` for what was not needed.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct CacheUse {
+    /// The simplified scene.
+    pub simplify: Option<Fetched>,
+    /// The radiosity solution.
+    pub radiosity: Option<Fetched>,
 }
 
 /// Seconds by stage.
