@@ -10,7 +10,7 @@ use crate::clock::Stopwatch;
 use crate::error::{Error, Result};
 use crate::pipeline::{BackendKind, GeometryKind, Method, Settings, Stats};
 use crate::progress::Progress;
-use crate::scene::{self, Scene};
+use crate::scene::{self, LoadOptions, Scene};
 use crate::simplify::BoxFit;
 
 /// A length or `auto`.
@@ -157,8 +157,16 @@ pub fn set_threads(threads: Option<usize>) -> Result<()> {
 /// # Errors
 /// As [`scene::gltf::load`].
 pub fn load(options: &SceneOptions, stats: &mut Stats) -> Result<Arc<Scene>> {
+    load_with(options, &LoadOptions::default(), stats)
+}
+
+/// The same, with a choice of what to read.
+///
+/// # Errors
+/// As [`scene::gltf::load`].
+pub fn load_with(options: &SceneOptions, what: &LoadOptions, stats: &mut Stats) -> Result<Arc<Scene>> {
     let start = Stopwatch::start();
-    let scene = scene::gltf::load(&options.scene, &scene::gltf::LoadOptions::default())?;
+    let scene = scene::gltf::load(&options.scene, what)?;
     stats.record_time(start, |s| &mut s.load);
     for warning in &scene.notes.warnings {
         log::warn!("{}: {warning}", scene.name);

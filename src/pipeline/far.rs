@@ -12,6 +12,7 @@ use crate::lighting::Lights;
 use crate::progress::Progress;
 use crate::radiosity::{self, RadiosityParams, RadiosityScene, Solution};
 use crate::render::Nearness;
+use crate::render::cache::flight::FlightRecords;
 use crate::scene::{Digest, Scene};
 use crate::simplify::{self, Simplified, SimplifiedGeometry, SimplifyParams, TriangleSource};
 
@@ -37,11 +38,11 @@ impl Far {
         lights: &Lights,
         backend: &dyn RayBackend,
         settings: &Settings,
+        kept: &mut Kept,
         progress: &Progress,
         stats: &mut Stats,
     ) -> Result<Far> {
         let start = Stopwatch::start();
-        let mut kept = Kept::open(settings, scene, backend)?;
         let simplified = kept.simplify(scene, backend, &settings.simplify_params(), progress)?;
         stats.record_simplified(&simplified);
         let complete = settings.complete_geometry();
@@ -68,7 +69,6 @@ impl Far {
         let solution = kept.solve(&input, complete, &settings.radiosity_params(), progress)?;
         stats.record_time(start, |s| &mut s.radiosity);
         stats.record_solution(&solution);
-        stats.cache = kept.used();
         let plain = geometry.sources.iter().map(|source| is_plain(scene, source)).collect();
         Ok(Far { simplified: (!complete).then_some(simplified), geometry, rays, solution, plain, nearness })
     }
@@ -86,6 +86,7 @@ fn is_plain(scene: &Scene, source: &TriangleSource) -> bool {
 }
 
 /// Simplifies and solves, or takes from the cache folder what was made before, where there is one.
+#[derive(Default)]
 pub(super) struct Kept(Option<Inside>);
 
 /// The folder, and what names the results for a scene in it.
@@ -93,8 +94,10 @@ struct Inside {
     cache: Cache,
     scene: Digest,
     backend: String,
-    /// Of the simplified scene, which the radiosity solution follows from.
+    /// Key of the simplified scene, which the radiosity solution follows from.
     simplified: String,
+    /// Key of the radiosity solution, which shared irradiance caches follow from.
+    radiosity: String,
     used: CacheUse,
 }
 
@@ -110,6 +113,7 @@ impl Kept {
             scene: scene.digest(),
             backend: backend.name(),
             simplified: String::new(),
+            radiosity: String::new(),
             used: CacheUse::default(),
         })))
     }
@@ -128,7 +132,7 @@ impl Kept {
         progress: &Progress,
     ) -> Result<Simplified> {
         let make = || simplify::simplify(scene, backend, params, progress);
-        let Some(Inside { cache, scene: digest, backend: name, simplified, used }) = &mut self.0 else { return make() };
+        let Some(Inside { cache, scene: digest, backend: name, simplified, used, .. }) = &mut self.0 else { return make() };
         let key = Key::new("simplified", &[digest.surfaces.to_hex().as_str(), name, &format!("{params:?}")]);
         let (result, fetched) = cache.fetch(key, progress, |s: Simplified| s.restored(scene), make)?;
         (*simplified, used.simplify) = (key.as_cause(), Some(fetched));
@@ -145,11 +149,26 @@ impl Kept {
     ) -> Result<Solution> {
         let geometry = if complete { "complete" } else { "simplified" };
         let make = || radiosity::solve(input, params, progress);
-        let Some(Inside { cache, scene, simplified, used, .. }) = &mut self.0 else { return make() };
+        let Some(Inside { cache, scene, simplified, radiosity, used, .. }) = &mut self.0 else { return make() };
         let key = Key::new("radiosity", &[simplified, &scene.lights.to_hex(), geometry, &format!("{params:?}")]);
         let triangles = input.geometry.triangles.len();
         let (solution, fetched) = cache.fetch(key, progress, |s: Solution| s.restored(triangles), make)?;
-        used.radiosity = Some(fetched);
+        (*radiosity, used.radiosity) = (key.as_cause(), Some(fetched));
         Ok(solution)
+    }
+
+    /// An irradiance cache that `fill` makes from what [`Kept::solve`] gave and from `causes`.
+    pub(super) fn flight(
+        &mut self,
+        causes: &str,
+        progress: &Progress,
+        fill: impl FnOnce() -> FlightRecords,
+    ) -> Result<FlightRecords> {
+        let Some(Inside { cache, radiosity, used, .. }) = &mut self.0 else { return Ok(fill()) };
+        let key = Key::new("flight", &[radiosity, causes]);
+        let sound = |records: FlightRecords| records.is_sound().then_some(records);
+        let (records, fetched) = cache.fetch(key, progress, sound, || Ok(fill()))?;
+        used.flight = Some(fetched);
+        Ok(records)
     }
 }

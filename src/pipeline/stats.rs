@@ -45,6 +45,8 @@ pub struct CacheUse {
     pub simplify: Option<Fetched>,
     /// The radiosity solution.
     pub radiosity: Option<Fetched>,
+    /// The irradiance cache that frames share.
+    pub flight: Option<Fetched>,
 }
 
 /// Seconds by stage.
@@ -58,6 +60,8 @@ pub struct Seconds {
     pub build: f64,
     /// Radiosity solution.
     pub radiosity: f64,
+    /// Irradiance cache that frames share.
+    pub flight: f64,
     /// HIRES pass.
     pub hires: f64,
     /// LORES pass.
@@ -138,6 +142,11 @@ impl Stats {
         let spent = start.spent();
         *stage(&mut self.seconds) += spent.wall;
         *stage(&mut self.cpu_seconds) += spent.cpu;
+    }
+
+    /// The same facts at no cost: for an image from a preparation that was paid for by an earlier one.
+    pub fn at_no_cost(self) -> Self {
+        Stats { seconds: Seconds::default(), cpu_seconds: Seconds::default(), rays: Rays::default(), ..self }
     }
 
     /// Records what simplification found.

@@ -39,6 +39,9 @@ pub const BATCH_TRIALS: u32 = 16;
 /// Keeps the pilot's random numbers apart from the image's.
 const PILOT: u32 = 0x7069_6c6f;
 
+/// Keeps the trials of frames apart.
+const FRAME: u32 = 0x6672_616d;
+
 /// Parameters of [`render`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct RenderParams {
@@ -64,12 +67,19 @@ pub struct RenderParams {
     pub interpolate: bool,
     /// Seed: the same seed gives the same image, bit for bit, for any number of threads.
     pub seed: u32,
+    /// Number in a sequence of frames; `None` for a single image. Frames have independent noise, and everything else in common.
+    pub frame: Option<u32>,
 }
 
 impl RenderParams {
     /// The part of the image that is rendered.
     pub fn region(&self) -> Region {
         self.region.unwrap_or(Region::whole([self.width, self.height]))
+    }
+
+    /// Seed of the trials.
+    fn trial_seed(&self) -> u32 {
+        self.frame.map_or(self.seed, |frame| hash_all(&[self.seed, FRAME, frame]))
     }
 
     /// An empty film of that part.
@@ -91,7 +101,7 @@ pub struct Rendering {
     pub cpu_times: PassTimes,
     /// Whether it was stopped before all planned trials were done.
     pub stopped: bool,
-    /// What indirect light was interpolated from.
+    /// What indirect light was interpolated from, where the world did not bring it.
     pub cache: Option<IrradianceCache>,
 }
 
@@ -120,7 +130,7 @@ pub fn render_rounds(
 ) {
     let over = || progress.stopped();
     let cache = irradiance_cache(world, camera, params, progress, &over);
-    let world = &World { cache: cache.as_ref(), ..*world };
+    let world = &World { cache: cache.as_ref().or(world.cache), ..*world };
     let mut renderer = Renderer::new(world, camera, params);
     let mut film = params.film();
     let plan = vec![Allocation::even(params.max_trials); film.tiles.len()];
@@ -140,7 +150,7 @@ pub fn render(world: &World<'_>, camera: &Camera, params: &RenderParams, progres
     let over = || progress.stopped() || deadline.is_some_and(|d| Instant::now() >= d);
     let cache = irradiance_cache(world, camera, params, progress, &over);
     let filled = start.spent();
-    let world = &World { cache: cache.as_ref(), ..*world };
+    let world = &World { cache: cache.as_ref().or(world.cache), ..*world };
     let mut renderer = Renderer::new(world, camera, params);
 
     let mut film = params.film();
@@ -164,7 +174,8 @@ pub fn render(world: &World<'_>, camera: &Camera, params: &RenderParams, progres
     Rendering { film, rays: renderer.rays, times, cpu_times, stopped, cache }
 }
 
-/// Places that indirect light is interpolated between, where that is wanted and there is a far field beyond a near one.
+/// Places that indirect light is interpolated between, where that is wanted, the world brings none, and there is a far field beyond a
+/// near one.
 fn irradiance_cache(
     world: &World<'_>,
     camera: &Camera,
@@ -172,11 +183,10 @@ fn irradiance_cache(
     progress: &Progress,
     over: &(dyn Fn() -> bool + Sync),
 ) -> Option<IrradianceCache> {
-    let two_fields = world.far.is_some_and(|far| far.r_thresh > 0.0 && far.r_thresh.is_finite());
+    let wanted = params.interpolate && world.cache.is_none() && world.has_two_fields();
     let stage = progress.stage("irradiance cache", 0);
     let size = [params.width, params.height];
-    let cache =
-        (params.interpolate && two_fields).then(|| IrradianceCache::new(world, camera, size, params.seed, over));
+    let cache = wanted.then(|| IrradianceCache::new(world, camera, size, params.seed, over));
     stage.finish_and_clear();
     cache
 }
@@ -208,7 +218,7 @@ impl<'a> Renderer<'a> {
         let mut done = 0;
         while done < most {
             let next = (2 * done).max(self.params.min_trials.max(1)).min(most);
-            if self.round(&mut film.tiles, plan, done..next, self.params.seed, over, advance) {
+            if self.round(&mut film.tiles, plan, done..next, self.params.trial_seed(), over, advance) {
                 return true;
             }
             done = next;

@@ -6,6 +6,7 @@
 //! close together next to other surfaces. Where none reaches, paths gather as without a cache.
 
 mod clamp;
+pub mod flight;
 mod index;
 mod record;
 
@@ -118,6 +119,11 @@ impl IrradianceCache {
             record.refuses = ACCURACY * distance < TOO_SMALL * record.least_reach;
             record.reach = (ACCURACY * distance).max(record.least_reach);
         }
+        self.arrange();
+    }
+
+    /// Makes the records findable.
+    fn arrange(&mut self) {
         self.index = Index::new(&self.records);
     }
 

@@ -3,6 +3,7 @@
 use std::f32::consts::{FRAC_1_PI, TAU};
 
 use glam::{Mat3, Vec3};
+use serde::{Deserialize, Serialize};
 
 use crate::sampling::{basis, sobol};
 
@@ -42,7 +43,7 @@ const MOST_CHANGE: f32 = 0.5;
 const IN_FRONT: f32 = 0.1;
 
 /// Indirect light at one point of a surface, and how it changes around it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(super) struct Record {
     pub position: Vec3,
     /// Unit shading normal on the lit side.
@@ -136,6 +137,14 @@ impl Record {
             by_rotation,
             by_translation,
         })
+    }
+
+    /// Whether all numbers in it are possible.
+    pub fn is_sound(&self) -> bool {
+        let vectors = [self.position, self.normal, self.radiance].into_iter();
+        vectors.chain(self.by_rotation).chain(self.by_translation).all(Vec3::is_finite)
+            && [self.distance, self.reach].iter().all(|x| *x > 0.0)
+            && self.reach.is_finite()
     }
 
     /// Distance over which the light would vanish or double if it went on changing as fast as here.

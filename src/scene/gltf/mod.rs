@@ -30,7 +30,7 @@ use self::buffers::Buffers;
 use self::container::Container;
 use self::deform::Deformation;
 use self::json::Document;
-pub use self::motion::Motion;
+pub use self::motion::{Arrangement, Motion};
 use self::nodes::Nodes;
 use self::primitive::Outcome;
 use self::textures::Textures;
