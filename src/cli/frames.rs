@@ -222,7 +222,11 @@ pub(super) fn run(options: &Options, range: Range, progress: &Progress) -> Resul
     for (frame, views) in to_do {
         let start = start.take().unwrap_or_else(Stopwatch::start);
         let prepared = stage.set(options.frames.seconds(frame), &mut stats, progress, |prepared, stats| {
-            if is_static && options.interpolates() { prepared.share_between(&all_views, progress, stats) } else { Ok(()) }
+            if is_static && options.interpolates() {
+                prepared.share_between(&all_views, progress, stats)
+            } else {
+                Ok(())
+            }
         })?;
         for view in &views {
             let params = options.render_params(&view.camera)?;

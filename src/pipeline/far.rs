@@ -132,7 +132,9 @@ impl Kept {
         progress: &Progress,
     ) -> Result<Simplified> {
         let make = || simplify::simplify(scene, backend, params, progress);
-        let Some(Inside { cache, scene: digest, backend: name, simplified, used, .. }) = &mut self.0 else { return make() };
+        let Some(Inside { cache, scene: digest, backend: name, simplified, used, .. }) = &mut self.0 else {
+            return make();
+        };
         let key = Key::new("simplified", &[digest.surfaces.to_hex().as_str(), name, &format!("{params:?}")]);
         let (result, fetched) = cache.fetch(key, progress, |s: Simplified| s.restored(scene), make)?;
         (*simplified, used.simplify) = (key.as_cause(), Some(fetched));

@@ -251,7 +251,11 @@ fn place_light(
     Ok(light)
 }
 
-pub(super) fn place_camera(camera: &Camera, transform: &DAffine3, centre: DVec3) -> std::result::Result<Camera, String> {
+pub(super) fn place_camera(
+    camera: &Camera,
+    transform: &DAffine3,
+    centre: DVec3,
+) -> std::result::Result<Camera, String> {
     let position = transform.transform_point3(camera.position.as_dvec3()) - centre;
     let column = |c: Vec3| transform.transform_vector3(c.as_dvec3()).normalize_or_zero();
     // The direction of view counts most, then up; a mirrored node does not mirror the image.

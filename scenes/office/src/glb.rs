@@ -139,8 +139,11 @@ pub fn write(scene: &Scene, out: &mut impl Write) -> io::Result<()> {
             byte_offset: Some(USize64::from(offset)),
             byte_stride: vertices.then_some(Stride(12)),
             name: Some((*name).into()),
-            target: (*name != "keys")
-                .then_some(Valid(if vertices { Target::ArrayBuffer } else { Target::ElementArrayBuffer })),
+            target: (*name != "keys").then_some(Valid(if vertices {
+                Target::ArrayBuffer
+            } else {
+                Target::ElementArrayBuffer
+            })),
             extensions: None,
             extras: Default::default(),
         });

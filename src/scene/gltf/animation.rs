@@ -68,7 +68,8 @@ impl Tracks {
                     continue;
                 }
                 if !known.insert((node, property as u8)) {
-                    warnings.push("several animations move the same nodes; the first one in the file counts".to_owned());
+                    warnings
+                        .push("several animations move the same nodes; the first one in the file counts".to_owned());
                     continue;
                 }
                 let sampler = animation.samplers.get(channel.sampler.value());
@@ -165,7 +166,8 @@ impl Track {
                     return a.to_vec();
                 }
                 let (t2, t3) = (t * t, t * t * t);
-                let weights = [2.0 * t3 - 3.0 * t2 + 1.0, length * (t3 - 2.0 * t2 + t), 3.0 * t2 - 2.0 * t3, length * (t3 - t2)];
+                let weights =
+                    [2.0 * t3 - 3.0 * t2 + 1.0, length * (t3 - 2.0 * t2 + t), 3.0 * t2 - 2.0 * t3, length * (t3 - t2)];
                 let sum = |i: usize| {
                     weights[0] * a[i] + weights[1] * leaving[i] + weights[2] * b[i] + weights[3] * arriving[i]
                 };
@@ -207,7 +209,9 @@ mod tests {
     fn lines_and_steps() {
         let along = |interpolation| track(Property::Scale, interpolation, 1, &[1.0, 2.0, 4.0], &[10.0, 20.0, 60.0]);
         let line = along(Interpolation::Linear);
-        for (seconds, value) in [(0.0, 10.0), (1.0, 10.0), (1.25, 12.5), (2.0, 20.0), (3.0, 40.0), (4.0, 60.0), (9.0, 60.0)] {
+        for (seconds, value) in
+            [(0.0, 10.0), (1.0, 10.0), (1.25, 12.5), (2.0, 20.0), (3.0, 40.0), (4.0, 60.0), (9.0, 60.0)]
+        {
             assert_eq!(line.at(seconds), [value], "at {seconds}");
         }
         let steps = along(Interpolation::Step);

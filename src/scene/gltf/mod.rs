@@ -12,6 +12,8 @@ mod instancing;
 mod json;
 mod materials;
 mod motion;
+#[cfg(test)]
+mod moving_tests;
 mod nodes;
 mod primitive;
 mod punctual;
