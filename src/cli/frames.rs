@@ -268,7 +268,7 @@ impl Stage<'_> {
             Some(fitting) => fitting,
             None => {
                 let first = animation.moments.first().map(|&m| animation.motion.arrangement(m)).transpose()?;
-                let scene = match first == Some(wanted.clone()) {
+                let scene = match first.as_ref() == Some(&wanted) {
                     true => animation.scene.clone(),
                     false => animation.scene_at(seconds, stats)?,
                 };

@@ -6,6 +6,7 @@
 
 use std::fs::File;
 use std::io::Write;
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 use std::time::Duration;
@@ -129,7 +130,9 @@ fn write(path: &Path, value: &impl Serialize) -> std::result::Result<(), String>
     let contents = postcard::to_stdvec(value).map_err(|e| e.to_string())?;
     let sum = Hasher::new().update_rayon(&contents).finalize();
     let folder = path.parent().unwrap_or(Path::new("."));
-    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(|e| e.to_string())?;
+    // Others of a group may share the folder: as open as the user's files are.
+    let open = std::fs::Permissions::from_mode(0o666);
+    let mut file = tempfile::Builder::new().permissions(open).tempfile_in(folder).map_err(|e| e.to_string())?;
     for part in [HEAD, sum.as_bytes().as_slice(), &contents] {
         file.write_all(part).map_err(|e| e.to_string())?;
     }

@@ -88,6 +88,8 @@ impl Tracks {
 
     /// Moves `transforms`, which are those of the file, to where they are at a moment.
     pub(super) fn pose(&self, transforms: &[Transform], seconds: f64) -> Pose {
+        // Keys are in single precision: what is meant to be the moment of a key becomes it.
+        let seconds = f64::from(seconds as f32);
         let mut pose = Pose::still(transforms);
         for track in &self.0 {
             let value = track.at(seconds);
