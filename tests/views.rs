@@ -89,6 +89,9 @@ fn flight() -> String {
     animate(&room, camera_node(&room), "translation", &[0.0, 0.25], &[EYE, end].concat())
 }
 
+/// What breaks a file.
+type Damage<'a> = &'a dyn Fn(&mut Vec<u8>);
+
 /// Makes changes to what is in the cache folder.
 fn change_files(folder: &Path, change: impl Fn(&mut Vec<u8>)) -> usize {
     let files: Vec<PathBuf> = std::fs::read_dir(folder).unwrap().map(|f| f.unwrap().path()).collect();
@@ -134,7 +137,7 @@ fn a_kept_preparation_gives_the_same_bytes_and_a_damaged_one_is_made_again() {
     std::fs::write(path("room.gltf"), lit_room()).unwrap();
 
     let kept = path("kept");
-    let damages: [&dyn Fn(&mut Vec<u8>); 4] = [
+    let damages: [Damage<'_>; 4] = [
         &|bytes| bytes.truncate(bytes.len() / 2),
         &|bytes| {
             let middle = bytes.len() / 2;

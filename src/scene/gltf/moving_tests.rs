@@ -88,10 +88,13 @@ fn morph_weights_are_animated() {
     assert_ne!(motion.arrangement(0.0).unwrap(), motion.arrangement(0.5).unwrap());
 }
 
+/// What breaks a file.
+type Damage<'a> = &'a dyn Fn(&mut Value);
+
 #[test]
 fn broken_animations_are_refused_when_they_are_played() {
     let good = || moving(0, "translation", "VEC3", &[0.0, 1.0], &[0.0; 6]);
-    let broken: [(&str, &dyn Fn(&mut Value)); 6] = [
+    let broken: [(&str, Damage<'_>); 6] = [
         ("ascend", &|v| *v = moving(0, "translation", "VEC3", &[1.0, 1.0], &[0.0; 6])),
         ("not finite", &|v| *v = moving(0, "scale", "VEC3", &[0.0, 1.0], &[f32::NAN; 6])),
         ("1 values for 2 keys", &|v| *v = moving(0, "translation", "VEC3", &[0.0, 1.0], &[0.0; 3])),
