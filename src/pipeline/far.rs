@@ -141,7 +141,7 @@ impl Kept {
         Ok(result)
     }
 
-    /// [`radiosity::solve`] on what [`Kept::simplify`] gave; what is read counts no rays.
+    /// [`radiosity::solve`](radiosity::solve()) on what [`Kept::simplify`] gave; what is read counts no rays.
     fn solve(
         &mut self,
         input: &RadiosityScene<'_>,
