@@ -53,7 +53,7 @@ impl Range {
 #[derive(Args, Debug)]
 pub struct FrameOptions {
     /// Render frames A to B of the file's animations, or every STEPth of them; '####' in names of files becomes the frame's number
-    #[arg(long, value_name = "A-B[:STEP]", help_heading = "Animation")]
+    #[arg(long, value_name = "A-B[:STEP]", conflicts_with = "partial", help_heading = "Animation")]
     frames: Option<Range>,
     /// Frames in a second: frame N shows the animations after N / FPS seconds
     #[arg(long, value_name = "FPS", default_value_t = 24.0, requires = "frames", help_heading = "Animation")]
@@ -138,6 +138,7 @@ impl Animation<'_> {
             let view = View {
                 outputs: view.outputs.into_iter().map(number).collect::<Result<_>>()?,
                 stats: view.stats.map(number).transpose()?,
+                checkpoint: view.checkpoint.map(number).transpose()?,
                 frame: Some(frame),
                 ..view
             };
@@ -217,7 +218,7 @@ pub(super) fn run(options: &Options, range: Range, progress: &Progress) -> Resul
     let cameras: Vec<Camera> = all_views.iter().map(|(camera, _)| camera.clone()).collect();
     let settings = automatic(&animation.scene, &cameras, options.method.settings())?;
     let is_static = animation.is_static()?;
-    let mut stage = Stage { animation: &animation, cameras, settings, at: None };
+    let mut stage = Stage { animation: &animation, cameras: &cameras, settings, at: None };
     let mut start = Some(start);
     for (frame, views) in to_do {
         let start = start.take().unwrap_or_else(Stopwatch::start);
@@ -232,8 +233,8 @@ pub(super) fn run(options: &Options, range: Range, progress: &Progress) -> Resul
             let params = options.render_params(&view.camera)?;
             let params = crate::render::RenderParams { frame: view.frame, ..params };
             let mut of_view = stats.clone();
-            if !options.render_view(prepared, view, &params, start, progress, &mut of_view)? {
-                options.talk.say(format!("gsii: stopped in frame {frame}; the same command goes on there"));
+            let kept = options.keep(&prepared.scene, &cameras, view, &params)?;
+            if !options.render_view(prepared, view, &params, kept.as_ref(), start, progress, &mut of_view)? {
                 return Ok(ExitCode::FAILURE);
             }
         }
@@ -245,7 +246,7 @@ pub(super) fn run(options: &Options, range: Range, progress: &Progress) -> Resul
 /// The scene as it is prepared at the moment.
 struct Stage<'a> {
     animation: &'a Animation<'a>,
-    cameras: Vec<Camera>,
+    cameras: &'a [Camera],
     /// The same for all frames.
     settings: Settings,
     at: Option<(Arrangement, Prepared)>,
@@ -272,7 +273,7 @@ impl Stage<'_> {
                     true => animation.scene.clone(),
                     false => animation.scene_at(seconds, stats)?,
                 };
-                let mut prepared = Prepared::for_cameras(scene, &self.cameras, self.settings.clone(), progress, stats)?;
+                let mut prepared = Prepared::for_cameras(scene, self.cameras, self.settings.clone(), progress, stats)?;
                 finish(&mut prepared, stats)?;
                 for warning in std::mem::take(&mut stats.warnings) {
                     log::warn!("{warning}");

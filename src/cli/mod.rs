@@ -3,6 +3,7 @@
 pub mod compare;
 pub mod frames;
 pub mod info;
+pub mod long;
 pub mod manual;
 pub mod merge;
 pub mod options;

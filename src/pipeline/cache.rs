@@ -6,7 +6,6 @@
 
 use std::fs::File;
 use std::io::Write;
-use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 use std::time::Duration;
@@ -15,8 +14,10 @@ use blake3::{Hash, Hasher};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
+use super::identity::program;
 use crate::error::{Error, Result};
 use crate::progress::Progress;
+use crate::unfinished;
 
 /// First bytes of every file; the number goes up with the arrangement of what follows: the hash of the contents, and the contents.
 const HEAD: &[u8; 16] = b"gsii cache  v1\r\n";
@@ -59,11 +60,8 @@ impl Key {
     }
 }
 
-/// Names the program by its own bytes: any other build may compute something else. By its version where it cannot read itself.
-static PROGRAM: LazyLock<Hash> = LazyLock::new(|| {
-    let own = std::env::current_exe().and_then(std::fs::read);
-    own.map_or_else(|_| blake3::hash(env!("CARGO_PKG_VERSION").as_bytes()), |bytes| blake3::hash(&bytes))
-});
+/// Any other build of the program may compute something else.
+static PROGRAM: LazyLock<String> = LazyLock::new(program);
 
 /// Such a folder.
 #[derive(Clone, Debug)]
@@ -107,9 +105,9 @@ impl Cache {
         }
         let made = make()?;
         if !progress.stopped()
-            && let Err(reason) = write(&path, &made)
+            && let Err(error) = write(&path, &made)
         {
-            log::warn!("{}: not kept: {reason}", path.display());
+            log::warn!("{error}");
         }
         Ok((made, Fetched::Miss))
     }
@@ -126,18 +124,15 @@ fn read<T: DeserializeOwned>(path: &Path) -> Option<T> {
     postcard::take_from_bytes(contents).ok().filter(|(_, rest)| rest.is_empty()).map(|(value, _)| value)
 }
 
-fn write(path: &Path, value: &impl Serialize) -> std::result::Result<(), String> {
-    let contents = postcard::to_stdvec(value).map_err(|e| e.to_string())?;
+fn write(path: &Path, value: &impl Serialize) -> Result<()> {
+    let failed = |e: postcard::Error| Error::Output { path: path.to_owned(), reason: e.to_string() };
+    let contents = postcard::to_stdvec(value).map_err(failed)?;
     let sum = Hasher::new().update_rayon(&contents).finalize();
-    let folder = path.parent().unwrap_or(Path::new("."));
-    // Others of a group may share the folder: as open as the user's files are.
-    let open = std::fs::Permissions::from_mode(0o666);
-    let mut file = tempfile::Builder::new().permissions(open).tempfile_in(folder).map_err(|e| e.to_string())?;
-    for part in [HEAD, sum.as_bytes().as_slice(), &contents] {
-        file.write_all(part).map_err(|e| e.to_string())?;
-    }
-    file.persist(path).map_err(|e| e.error.to_string())?;
-    Ok(())
+    unfinished::write(path, |out| {
+        out.write_all(HEAD)?;
+        out.write_all(sum.as_bytes())?;
+        out.write_all(&contents)
+    })
 }
 
 /// The right to make one file. The system takes it from processes that end, in whatever way.

@@ -11,12 +11,11 @@ use crate::error::Result;
 use crate::lighting::Lights;
 use crate::progress::Progress;
 use crate::radiosity::{self, RadiosityParams, RadiosityScene, Solution};
-use crate::render::Nearness;
-use crate::render::cache::flight::FlightRecords;
+use crate::render::{IrradianceCache, Nearness};
 use crate::scene::{Digest, Scene};
 use crate::simplify::{self, Simplified, SimplifiedGeometry, SimplifyParams, TriangleSource};
 
-/// The far field's parts; see [`FarField`].
+/// The far field's parts; see [`FarField`](crate::render::FarField).
 pub struct Far {
     /// How the simplification came about; `None` where the geometry is complete (PMM).
     pub simplified: Option<Simplified>,
@@ -26,7 +25,7 @@ pub struct Far {
     pub rays: Box<dyn RayScene>,
     /// Radiosities.
     pub solution: Solution,
-    /// See [`FarField::plain`].
+    /// See [`FarField::plain`](crate::render::FarField::plain).
     pub plain: Vec<bool>,
     /// Where near parts of gather rays need the detailed scene.
     pub nearness: Option<Nearness>,
@@ -164,13 +163,13 @@ impl Kept {
         &mut self,
         causes: &str,
         progress: &Progress,
-        fill: impl FnOnce() -> FlightRecords,
-    ) -> Result<FlightRecords> {
+        fill: impl FnOnce() -> IrradianceCache,
+    ) -> Result<IrradianceCache> {
         let Some(Inside { cache, radiosity, used, .. }) = &mut self.0 else { return Ok(fill()) };
         let key = Key::new("flight", &[radiosity, causes]);
-        let sound = |records: FlightRecords| records.is_sound().then_some(records);
-        let (records, fetched) = cache.fetch(key, progress, sound, || Ok(fill()))?;
+        let sound = |flight: IrradianceCache| flight.is_sound().then_some(flight);
+        let (flight, fetched) = cache.fetch(key, progress, sound, || Ok(fill()))?;
         used.flight = Some(fetched);
-        Ok(records)
+        Ok(flight)
     }
 }

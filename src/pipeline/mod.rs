@@ -3,6 +3,7 @@
 pub mod auto;
 pub mod cache;
 mod far;
+pub mod identity;
 pub mod settings;
 pub mod stats;
 pub mod validate;
@@ -22,8 +23,7 @@ use crate::error::{Error, Result};
 use crate::lighting::Lights;
 use crate::progress::Progress;
 use crate::radiosity::RadiosityParams;
-use crate::render::cache::flight;
-use crate::render::{self, FarField, IrradianceCache, RenderParams, Rendering, Round, World};
+use crate::render::{self, FarField, IrradianceCache, RenderParams, Rendering, Round, Session, Watcher, World};
 use crate::scene::{Camera, Scene};
 use crate::shading::Lobes;
 use crate::simplify::{self, Simplified, SimplifyParams};
@@ -140,10 +140,10 @@ impl Prepared {
         let stage = progress.stage("irradiance cache", 0);
         let mut kept = std::mem::take(&mut self.kept);
         let settings = Settings { cache: None, threads: 0, ..self.settings.clone() };
-        let fill = || flight::gather_for_views(&self.world(), views, settings.seed, &|| progress.stopped());
-        let records = kept.flight(&format!("{settings:?} {views:?}"), progress, fill)?;
+        let fill = || IrradianceCache::for_views(&self.world(), views, settings.seed, &|| progress.stopped());
+        let flight = kept.flight(&format!("{settings:?} {views:?}"), progress, fill)?;
         stats.cache = kept.used();
-        (self.kept, self.flight) = (kept, Some(records.into()));
+        (self.kept, self.flight) = (kept, Some(flight));
         stage.finish_and_clear();
         stats.record_time(start, |s| &mut s.flight);
         Ok(())
@@ -151,10 +151,22 @@ impl Prepared {
 
     /// Renders with the method that this was prepared for.
     pub fn render(&self, camera: &Camera, params: &RenderParams, progress: &Progress) -> Rendering {
+        self.resume(camera, params, Session::new(params), progress, None)
+    }
+
+    /// Goes on with a rendering while `watcher` looks at it; see [`render::resume`]. Radiosity is shown from the beginning, in one go.
+    pub fn resume(
+        &self,
+        camera: &Camera,
+        params: &RenderParams,
+        session: Session,
+        progress: &Progress,
+        watcher: Option<&mut dyn Watcher>,
+    ) -> Rendering {
         let world = self.world();
         match (self.settings.method, world.far) {
             (Method::Radiosity, Some(far)) => render::show::show_radiosity(&world, &far, camera, params),
-            _ => render::render(&world, camera, params, progress),
+            _ => render::resume(&world, camera, params, session, progress, watcher),
         }
     }
 
@@ -273,7 +285,7 @@ impl Settings {
         }
     }
 
-    /// Parameters for [`radiosity::solve`].
+    /// Parameters for [`radiosity::solve`](crate::radiosity::solve()).
     pub fn radiosity_params(&self) -> RadiosityParams {
         RadiosityParams {
             patch_size: self.patch_size.unwrap_or(f32::MAX),

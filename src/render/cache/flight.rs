@@ -5,7 +5,6 @@
 //! With one cache for all, the error stays on the surfaces like paint.
 
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
 use super::{IrradianceCache, PASSES, Record, STREAM, gather};
 use crate::render::integrator::World;
@@ -14,54 +13,42 @@ use crate::render::workspace::Workspace;
 use crate::sampling::hash_all;
 use crate::scene::Camera;
 
-/// What a cache for many views consists of.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct FlightRecords(Vec<Record>);
-
-impl FlightRecords {
-    /// Whether all numbers in it are possible: records from a file are not believed.
-    pub fn is_sound(&self) -> bool {
-        self.0.iter().all(Record::is_sound)
-    }
-}
-
-impl From<FlightRecords> for IrradianceCache {
-    fn from(records: FlightRecords) -> Self {
-        let mut cache = IrradianceCache { records: records.0, ..IrradianceCache::default() };
-        cache.arrange();
-        cache
-    }
-}
-
-/// Gathers records for all `views`, each a camera with the size of its image in pixels. The same on any number of threads, unless
-/// `over` says that it must end.
-pub fn gather_for_views(
-    world: &World<'_>,
-    views: &[(Camera, [u32; 2])],
-    seed: u32,
-    over: &(dyn Fn() -> bool + Sync),
-) -> FlightRecords {
-    let mut cache = IrradianceCache::default();
-    let Some(far) = &world.far else { return FlightRecords(Vec::new()) };
-    // Records that came for later views have shortened the reach of earlier ones: the last pass is done twice.
-    for (pass, (spacing, strata)) in (0u32..).zip(PASSES.into_iter().chain(PASSES.last().copied())) {
-        for (number, (camera, size)) in (0u32..).zip(views) {
-            let view = ViewRays::new(camera, *size, hash_all(&[seed, STREAM, number]));
-            let places = cache.places(world, &view, *size, spacing, pass);
-            let fresh: Vec<Option<Record>> = (0u32..places.len() as u32)
-                .into_par_iter()
-                .map_init(Workspace::default, |ws, place| {
-                    let stream = hash_all(&[seed, STREAM, pass, number, place]);
-                    if over() { None } else { gather(world, far, ws, &places[place as usize], strata, stream) }
-                })
-                .collect();
-            if fresh.iter().any(Option::is_some) {
-                cache.records.extend(fresh.into_iter().flatten());
-                cache.settle(far.r_thresh);
+impl IrradianceCache {
+    /// A full cache for all `views`, each a camera with the size of its image in pixels. The same on any number of threads, unless
+    /// `over` says that it must end.
+    pub fn for_views(
+        world: &World<'_>,
+        views: &[(Camera, [u32; 2])],
+        seed: u32,
+        over: &(dyn Fn() -> bool + Sync),
+    ) -> Self {
+        let mut cache = IrradianceCache { passes: PASSES.len(), ..IrradianceCache::default() };
+        let Some(far) = &world.far else { return cache };
+        // Records that came for later views have shortened the reach of earlier ones: the last pass is done twice.
+        for (pass, (spacing, strata)) in (0u32..).zip(PASSES.into_iter().chain(PASSES.last().copied())) {
+            for (number, (camera, size)) in (0u32..).zip(views) {
+                let view = ViewRays::new(camera, *size, hash_all(&[seed, STREAM, number]));
+                let places = cache.places(world, &view, *size, spacing, pass);
+                let fresh: Vec<Option<Record>> = (0..places.len())
+                    .into_par_iter()
+                    .map_init(Workspace::default, |ws, place| {
+                        let stream = hash_all(&[seed, STREAM, pass, number, place as u32]);
+                        if over() { None } else { gather(world, far, ws, &places[place], strata, stream) }
+                    })
+                    .collect();
+                if fresh.iter().any(Option::is_some) {
+                    cache.records.extend(fresh.into_iter().flatten());
+                    cache.settle(far.r_thresh);
+                }
             }
         }
+        cache.check();
+        log::debug!("irradiance cache of {} views: {} records", views.len(), cache.len());
+        cache
     }
-    cache.check();
-    log::debug!("irradiance cache of {} views: {} records", views.len(), cache.len());
-    FlightRecords(cache.records)
+
+    /// Whether all numbers in it are possible: a cache from a file is not believed.
+    pub(crate) fn is_sound(&self) -> bool {
+        self.records.iter().all(Record::is_sound)
+    }
 }
