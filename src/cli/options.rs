@@ -10,7 +10,7 @@ use crate::clock::Stopwatch;
 use crate::error::{Error, Result};
 use crate::pipeline::{BackendKind, GeometryKind, Method, Settings, Stats};
 use crate::progress::Progress;
-use crate::scene::{self, Scene};
+use crate::scene::{self, LoadOptions, Scene};
 use crate::simplify::BoxFit;
 
 /// A length or `auto`.
@@ -74,6 +74,9 @@ pub struct MethodOptions {
     /// Threads [default: all]
     #[arg(long, value_name = "N", help_heading = "Run")]
     pub threads: Option<usize>,
+    /// Folder that keeps the simplified scene and the radiosity solution for later runs
+    #[arg(long, value_name = "DIR", help_heading = "Run")]
+    pub cache: Option<PathBuf>,
     /// Ray-tracing library
     #[arg(long, value_enum, default_value_t, help_heading = "Run")]
     pub backend: BackendKind,
@@ -126,6 +129,7 @@ impl MethodOptions {
             filter_glossy: self.filter_glossy,
             max_depth: self.max_depth.unwrap_or(default.max_depth),
             backend: self.backend,
+            cache: self.cache.clone(),
             threads: self.threads.unwrap_or(0),
             seed: self.seed,
             ..default
@@ -153,8 +157,16 @@ pub fn set_threads(threads: Option<usize>) -> Result<()> {
 /// # Errors
 /// As [`scene::gltf::load`].
 pub fn load(options: &SceneOptions, stats: &mut Stats) -> Result<Arc<Scene>> {
+    load_with(options, &LoadOptions::default(), stats)
+}
+
+/// The same, with a choice of what to read.
+///
+/// # Errors
+/// As [`scene::gltf::load`].
+pub fn load_with(options: &SceneOptions, what: &LoadOptions, stats: &mut Stats) -> Result<Arc<Scene>> {
     let start = Stopwatch::start();
-    let scene = scene::gltf::load(&options.scene, &scene::gltf::LoadOptions::default())?;
+    let scene = scene::gltf::load(&options.scene, what)?;
     stats.record_time(start, |s| &mut s.load);
     for warning in &scene.notes.warnings {
         log::warn!("{}: {warning}", scene.name);

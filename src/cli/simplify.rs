@@ -46,6 +46,9 @@ pub struct Options {
     /// Seed: the same seed gives the same result, bit for bit
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Run")]
     seed: u32,
+    /// Folder that keeps the result for later runs
+    #[arg(long, value_name = "DIR", help_heading = "Run")]
+    cache: Option<PathBuf>,
     /// Ray-tracing library
     #[arg(long, value_enum, default_value_t, help_heading = "Run")]
     backend: BackendKind,
@@ -64,6 +67,7 @@ impl Options {
             longest_cluster: self.longest_cluster,
             patch_size: self.patch_size.0,
             backend: self.backend,
+            cache: self.cache.clone(),
             seed: self.seed,
             ..default
         }

@@ -1,5 +1,7 @@
 //! All that a user can choose, independent of the command line.
 
+use std::path::PathBuf;
+
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
@@ -84,6 +86,9 @@ pub struct Settings {
     pub max_depth: u32,
     /// Ray-tracing library.
     pub backend: BackendKind,
+    /// Folder that the simplified scene and the radiosity solution are kept in for later runs; see [`Cache`](super::Cache). No result
+    /// depends on it.
+    pub cache: Option<PathBuf>,
     /// Threads for the library's own work; 0 for all.
     pub threads: usize,
     /// Seed of everything random.
@@ -111,6 +116,7 @@ impl Default for Settings {
             filter_glossy: 0.3,
             max_depth: u32::MAX,
             backend: BackendKind::Embree,
+            cache: None,
             threads: 0,
             seed: 0,
         }

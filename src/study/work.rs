@@ -129,6 +129,7 @@ fn params(run: &Run, subject: &Subject, min_trials: u32, max_trials: u32, error:
         features: false,
         interpolate: run.interpolate,
         seed: SEED,
+        frame: None,
     }
 }
 

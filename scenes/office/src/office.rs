@@ -45,6 +45,7 @@ impl Office {
         let mut office = Office { scene: Scene::default(), detail, seed };
         things::furnish(&mut office);
         office.scene.cameras = cameras();
+        office.scene.fly(0, 1);
         office.scene
     }
 

@@ -12,6 +12,7 @@ use std::collections::VecDeque;
 
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
 use crate::radiosity::{Focus, RadiosityScene};
@@ -55,7 +56,7 @@ pub(super) struct Patches {
 }
 
 /// From points on triangles to patches.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(super) struct PatchMap {
     /// One a triangle.
     maps: Vec<CellMap>,
@@ -75,7 +76,7 @@ pub(super) struct BoxCell {
 }
 
 /// From barycentrics of a triangle to a cell: two affine functions.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct CellMap {
     origin: Vec2,
     du: Vec2,
@@ -217,6 +218,17 @@ impl Patches {
 }
 
 impl PatchMap {
+    /// Whether every point on each of so many triangles leads to one of `patches`.
+    pub fn is_whole(&self, triangles: usize, patches: usize) -> bool {
+        let inside = |map: &CellMap| {
+            let [nx, ny] = map.cells.map(u64::from);
+            nx > 0 && ny > 0 && u64::from(map.first) + nx * ny <= self.cells.len() as u64
+        };
+        self.maps.len() == triangles
+            && self.maps.iter().all(inside)
+            && self.cells.iter().all(|&patch| (patch as usize) < patches)
+    }
+
     /// The patch at barycentrics `u`, `v` of a triangle.
     pub fn at(&self, triangle: u32, u: f32, v: f32) -> u32 {
         let map = &self.maps[triangle as usize];
