@@ -5,7 +5,7 @@ use glam::{Quat, Vec3};
 use super::*;
 
 fn cut(room: &Room, size: f64) -> Patches {
-    Patches::new(&room.geometry, &[], size, 100_000).unwrap()
+    Patches::new(&room.geometry, &[], &RadiosityParams::new(size as f32)).unwrap()
 }
 
 #[test]
@@ -89,9 +89,23 @@ fn areas_add_up_and_points_lie_on_their_patch() {
 #[test]
 fn number_of_patches_is_bounded() {
     let room = closed_box([1.0; 3], [0.5; 6], [0.0; 6]);
-    let patches = Patches::new(&room.geometry, &[], 1e-4, 1000).unwrap();
+    let params = RadiosityParams { max_patches: 1000, ..RadiosityParams::new(1e-4) };
+    let patches = Patches::new(&room.geometry, &[], &params).unwrap();
     assert!((500..=1000).contains(&patches.len()), "{}", patches.len());
     assert!(patches.size > 1e-4);
+}
+
+#[test]
+fn each_surface_has_its_fewest_patches() {
+    let room = closed_box([4.0, 3.0, 0.01], [0.5; 6], [0.0; 6]);
+    // Faces of 4 x 3, and strips of 3 and 4 by a hundredth.
+    for (least, faces, strips) in [(1, 1, 1), (2, 2, 2), (7, 8, 7), (12, 12, 12)] {
+        let params = RadiosityParams { least_patches: least, ..RadiosityParams::new(10.0) };
+        assert_eq!(Patches::new(&room.geometry, &[], &params).unwrap().len(), 2 * faces + 4 * strips, "{least}");
+    }
+    // Where patches of the size are more, the size decides.
+    let params = RadiosityParams { least_patches: 7, ..RadiosityParams::new(0.5) };
+    assert_eq!(Patches::new(&room.geometry, &[], &params).unwrap().len(), 2 * (8 * 6) + 2 * 7 + 2 * 8);
 }
 
 /// As many patches as the paper's N+C scene, which its authors could not finish.
