@@ -15,7 +15,7 @@ pub const PAPER_R_THRESH: f32 = 0.053;
 pub const PAPER_BETA: f32 = 1.0 / TAU;
 /// Edge length of patches, in units of the largest linear dimension of the room, and fewest patches of a surface with which the
 /// office has about as many patches as the paper's: 74,924 on normal + complex surfaces, 1124 on normal + simple ones.
-pub const PAPER_PATCHES: (f32, u32) = (0.1, 6);
+pub const PAPER_PATCHES: (f32, u32) = (0.1, 7);
 
 /// What a run is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]

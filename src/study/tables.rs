@@ -62,7 +62,7 @@ fn table_1(chapters: &[Chapter<'_>]) -> Table {
     let mut table = Table::new(
         "table-1",
         "Table 1. Radiosity before the first pixel",
-        "The paper's r_thresh, beta and boxes; patches of a tenth of the room's length, but at least 6 for each surface, so that there are about as many as in \
+        "The paper's r_thresh, beta and boxes; patches of a tenth of the room's length, but at least 7 for each surface, as the paper has on average, so that there are about as many as in \
          the paper. Unshot: share of the emitted flux. Error: relative standard error of \
          the solution, which the paper's hemi-cubes did not state. Ratio: time of N+C over that of this row. The paper's times (hours:minutes) are those of an SGI \
          4D/20; its last one did not run to the end.",

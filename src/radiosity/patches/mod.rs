@@ -6,6 +6,7 @@
 mod charts;
 mod exposure;
 mod grid;
+mod join;
 mod sampling;
 
 use std::collections::VecDeque;
@@ -29,7 +30,8 @@ const CHART_COS: f64 = 0.866;
 /// The same where charts alone would exceed the bound on patches: cos 60 degrees.
 const COARSE_CHART_COS: f64 = 0.5;
 
-/// A cell with less than this share of the chart's fullest cell is joined to a neighbour: it would catch too few rays.
+/// A cell with less than this share of the chart's fullest cell, and a chart with less than this share of a patch, is joined to a neighbour: it
+/// would catch too few rays.
 const SMALLEST_SHARE: f64 = 0.05;
 
 /// All patches of a geometry. Patch `p` has the sides `2 p` (front) and `2 p + 1` (back).
@@ -117,9 +119,9 @@ impl Patches {
     /// # Errors
     /// When there are more grid cells than 32 bits can number.
     pub fn new(geometry: &SimplifiedGeometry, clusters: &[Cluster], params: &RadiosityParams) -> Result<Patches> {
-        let mut charts = charts::grow(geometry, CHART_COS);
+        let mut charts = charts::grow(geometry, CHART_COS, f64::from(params.patch_size));
         if charts.frames.len() > params.max_patches {
-            charts = charts::grow(geometry, COARSE_CHART_COS);
+            charts = charts::grow(geometry, COARSE_CHART_COS, f64::from(params.patch_size));
         }
         let (grids, members, size) = grids(geometry, clusters, &charts, params);
         let cells: u64 = grids.iter().map(Grid::len).sum();
