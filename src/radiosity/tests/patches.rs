@@ -96,6 +96,30 @@ fn number_of_patches_is_bounded() {
 }
 
 #[test]
+fn rounded_edge_is_no_patch_of_its_own() {
+    // A board's top and side, with four strips between them that turn by 22.5 degrees from one to the next.
+    let (top, side, radius) = (0.99, 0.49, 0.004);
+    let mut profile = vec![Vec3::ZERO];
+    profile.extend((0..=4).map(|i| {
+        let (sin, cos) = (0.25 * i as f32 * std::f32::consts::FRAC_PI_2).sin_cos();
+        Vec3::new(top + radius * sin, radius * (cos - 1.0), 0.0)
+    }));
+    profile.push(profile[5] - side * Vec3::Y);
+    let quads = profile.windows(2).flat_map(|p| {
+        let [a, b] = [p[0], p[1]];
+        [[a, a + Vec3::Z, b + Vec3::Z], [a, b + Vec3::Z, b]]
+    });
+    let room = Room::new(vec![(quads.collect(), material(0.5, 0.0))], Vec::new());
+    assert_eq!(room.geometry.surfaces, 1);
+    let patches = cut(&room, 0.25);
+    assert_eq!(patches.len(), 4 * 4 + 2 * 4);
+    let total: f64 = (0..room.geometry.triangles.len() as u32).map(|t| room.scene.mesh.area(t)).sum();
+    assert_close("area", patches.area.iter().sum(), total, 1e-9);
+    // Against large patches all of it is small.
+    assert_eq!(cut(&room, 10.0).len(), 1);
+}
+
+#[test]
 fn each_surface_has_its_fewest_patches() {
     let room = closed_box([4.0, 3.0, 0.01], [0.5; 6], [0.0; 6]);
     // Faces of 4 x 3, and strips of 3 and 4 by a hundredth.
