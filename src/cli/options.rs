@@ -59,6 +59,9 @@ pub struct MethodOptions {
     /// Edge length of radiosity patches (scene units)
     #[arg(long, value_name = "LENGTH|auto", default_value = "auto", help_heading = "Method")]
     pub patch_size: LengthOrAuto,
+    /// Fewest patches that a surface is cut into, about, however small it is; the paper's surfaces have 7 on average
+    #[arg(long, value_name = "N", default_value_t = Settings::default().least_patches, help_heading = "Method")]
+    pub least_patches: u32,
     /// How boxes are fitted to clusters
     #[arg(long = "box", value_enum, default_value_t, help_heading = "Method")]
     pub box_fit: BoxFit,
@@ -125,6 +128,7 @@ impl MethodOptions {
             beta: self.beta.unwrap_or(default.beta),
             box_fit: self.box_fit,
             patch_size: self.patch_size.0,
+            least_patches: self.least_patches,
             unshot: self.unshot,
             filter_glossy: self.filter_glossy,
             max_depth: self.max_depth.unwrap_or(default.max_depth),

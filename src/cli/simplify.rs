@@ -43,6 +43,9 @@ pub struct Options {
     /// Edge length of radiosity patches (scene units)
     #[arg(long, value_name = "LENGTH|auto", default_value = "auto", help_heading = "Method")]
     patch_size: LengthOrAuto,
+    /// Fewest patches that a surface is cut into, about, however small it is; the paper's surfaces have 7 on average
+    #[arg(long, value_name = "N", default_value_t = Settings::default().least_patches, help_heading = "Method")]
+    least_patches: u32,
     /// Seed: the same seed gives the same result, bit for bit
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Run")]
     seed: u32,
@@ -66,6 +69,7 @@ impl Options {
             box_fit: self.box_fit,
             longest_cluster: self.longest_cluster,
             patch_size: self.patch_size.0,
+            least_patches: self.least_patches,
             backend: self.backend,
             cache: self.cache.clone(),
             seed: self.seed,

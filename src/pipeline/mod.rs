@@ -289,6 +289,7 @@ impl Settings {
     pub fn radiosity_params(&self) -> RadiosityParams {
         RadiosityParams {
             patch_size: self.patch_size.unwrap_or(f32::MAX),
+            least_patches: self.least_patches,
             max_rays: self.radiosity_rays,
             focus: self.focus,
             unshot: self.unshot,
