@@ -24,8 +24,7 @@ impl IrradianceCache {
     ) -> Self {
         let mut cache = IrradianceCache { passes: PASSES.len(), ..IrradianceCache::default() };
         let Some(far) = &world.far else { return cache };
-        // Records that came for later views have shortened the reach of earlier ones: the last pass is done twice.
-        for (pass, (spacing, strata)) in (0u32..).zip(PASSES.into_iter().chain(PASSES.last().copied())) {
+        for (pass, (spacing, strata)) in (0u32..).zip(PASSES) {
             for (number, (camera, size)) in (0u32..).zip(views) {
                 let view = ViewRays::new(camera, *size, hash_all(&[seed, STREAM, number]));
                 let places = cache.places(world, &view, *size, spacing, pass);
