@@ -11,6 +11,8 @@ use crate::sampling;
 
 /// Share of the unshot flux that one batch of shots takes: as many sides as are needed, largest first.
 const BATCH: f64 = 0.5;
+/// Fewest sides that are worth another thread.
+const SIDES_OF_A_JOB: usize = 1024;
 /// A scene is given up when it has shot its light this many times over ...
 const HOPELESS_SHOTS: f64 = 10.0;
 /// ... and lost less than this share of what it shot.
@@ -102,6 +104,11 @@ impl<'a> Run<'a> {
     /// # Errors
     /// [`Error::Unsolvable`] when the light does not decrease.
     pub fn refine(&mut self, rays: u64, limit: f64, progress: &Progress) -> Result<()> {
+        // In a thread of the pool, which then need not be woken for each of perhaps thousands of small batches.
+        rayon::scope(|_| self.refine_within_pool(rays, limit, progress))
+    }
+
+    fn refine_within_pool(&mut self, rays: u64, limit: f64, progress: &Progress) -> Result<()> {
         let initial: f64 = (0..self.incident.len()).map(|s| self.importance(s, self.unshot(s))).sum();
         let mut shot = 0.0;
         let total_steps = 1000.0;
@@ -138,6 +145,7 @@ impl<'a> Run<'a> {
     fn next_shots(&self, density: f64) -> (Vec<Shot>, f64) {
         let mut order: Vec<(f64, u32)> = (0..self.incident.len())
             .into_par_iter()
+            .with_min_len(SIDES_OF_A_JOB)
             .map(|side| (self.importance(side, self.unshot(side)), side as u32))
             .filter(|&(importance, _)| importance > 0.0)
             .collect();

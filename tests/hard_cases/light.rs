@@ -148,11 +148,11 @@ fn numbers_beyond_f32_are_dropped_and_counted() {
 
 #[test]
 fn lamps_of_two_sides_do_not_shine_on_themselves() {
-    // C7: a shade without thickness that shines to both sides and reflects, alone in the dark: rays that start on one side must not meet
-    // the other.
+    // C7: a plane shade without thickness that shines to both sides and reflects, alone in the dark: rays that start on one side must not
+    // meet it again. Its corners are binary fractions: rounded, it would not be plane, and would light itself a little.
     let mut model = Model::new();
     let shade = Material { double_sided: true, ..glow(0.9, 1.0) };
-    model.add("shade", diced([v(0., 0., 0.), v(1., 0., 0.1), v(1., 1., 0.2), v(0., 1., 0.1)], 8), shade);
+    model.add("shade", diced([v(0., 0., 0.), v(1., 0., 0.125), v(1., 1., 0.25), v(0., 1., 0.125)], 8), shade);
     let room = Room::new(model.finish());
     for direct in [DirectLight::Shoot, DirectLight::Gather] {
         let params = RadiosityParams { direct, patch_size: 0.2, ..one_patch(0.1, 1) };
@@ -163,7 +163,7 @@ fn lamps_of_two_sides_do_not_shine_on_themselves() {
         assert!((solution.ledger.emitted[0] - emitted).abs() < 1e-5 * both_sides, "{:?}", solution.ledger);
     }
     for towards in [DVec3::Z, -DVec3::Z] {
-        let camera = [look_at(&room.scene, v(0.5, 0.5, 0.1), towards, 1.0, 0.2)];
+        let camera = [look_at(&room.scene, v(0.5, 0.5, 0.125), towards, 1.0, 0.2)];
         let [emitted, reflected, _] = all_parts(&room.scene, &mcpt(), &camera, [8, 8], 64)[0];
         assert!((emitted.mean - 1.0 / PI).abs() < 1e-6, "{emitted:?}");
         assert_eq!(reflected.mean, 0.0);
