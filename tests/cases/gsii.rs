@@ -531,7 +531,8 @@ fn gsii_020_black_room(case: &Case, out: &mut Outcome<'_>) {
                 beta: 0.0645,
                 box_fit: fit,
                 patch_size: Some(1.0),
-                radiosity_error: 1.2e-3,
+                // A fifth of what is allowed for the mean of 16 seeds.
+                radiosity_error: 4e-3,
                 seed,
                 ..Settings::default()
             };

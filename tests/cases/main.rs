@@ -34,11 +34,6 @@ const KNOWN: &[(&str, &str)] = &[
         "GSII-015",
         "boxes let 2 % of the light through that solid blocks stop: clusters are fitted on average, not made tight",
     ),
-    (
-        "SPEC-006",
-        "light that grazes the ball: probably lost where interpolated normals reflect it below the ball's triangles",
-    ),
-    ("GSII-020", "one face in one of 16 solutions gets 8 % too little direct light; the cause is not found"),
 ];
 
 fn recipe(id: &str) -> Option<Recipe> {
