@@ -3,8 +3,8 @@
 use std::f64::consts::PI;
 
 use glam::{DVec3, Mat3, Vec2};
-use gsii::backend::{Coherence, Hit, Ray, Visible};
-use gsii::pipeline::{Method, Settings};
+use gsii::backend::{Coherence, Hit, Ray, RayScene, Visible};
+use gsii::pipeline::{Method, Prepared, Settings};
 use gsii::radiosity::DirectLight;
 use gsii::sampling::{basis, cosine_hemisphere, sobol};
 use gsii::scene::Scene;
@@ -373,6 +373,28 @@ fn gsii_013_emitting_clutter(case: &Case, out: &mut Outcome<'_>) {
     }
 }
 
+/// Shares of cosine-distributed rays from a point of the floor that clutter stops, and that its boxes stop.
+fn stopped(prepared: &Prepared, point: DVec3) -> [f64; 2] {
+    const RAYS: u32 = 1 << 16;
+    let scene = &prepared.scene;
+    let origin = (point + 1e-4 * DVec3::Z - scene.centre).as_vec3();
+    let rays: Vec<Ray> = (0..RAYS)
+        .map(|i| {
+            let u = sobol(i, 0, 12);
+            Ray::new(origin, cosine_hemisphere(Vec2::new(u[0], u[1])))
+        })
+        .collect();
+    let far = prepared.far.as_ref().unwrap();
+    let is_clutter = |hit: &Hit| !scene.material(hit.triangle).is_emitter();
+    let is_box = |hit: &Hit| matches!(far.geometry.sources[hit.triangle as usize], TriangleSource::BoxFace { .. });
+    let share = |rays_of: &dyn RayScene, counts: &dyn Fn(&Hit) -> bool| {
+        let mut hits = vec![Hit::MISS; rays.len()];
+        rays_of.closest(&rays, Visible::All, Coherence::Incoherent, &mut hits);
+        hits.iter().filter(|hit| hit.is_hit() && counts(hit)).count() as f64 / f64::from(RAYS)
+    };
+    [share(&*prepared.detailed, &is_clutter), share(&*far.rays, &is_box)]
+}
+
 fn gsii_014_white_clutter(case: &Case, out: &mut Outcome<'_>) {
     let places = (0..1000).map(|k| 0.4 + 0.02 * v(f64::from(k % 10), f64::from(k / 10 % 10), f64::from(k / 100)));
     let scene = furnace_with(places, grey(0.999)).finish();
@@ -409,6 +431,15 @@ fn gsii_014_white_clutter(case: &Case, out: &mut Outcome<'_>) {
                 .collect();
             let prepared = prepare_seeds(&scene, &settings);
             let seen = all_parts_of(&prepared, &cameras, [4, 4], 1 << 8);
+            if r == 0.05 {
+                // Emitted light is stopped by the clutter, reflected light comes from the boxes.
+                let [clutter, boxes] = stopped(&prepared[0], v(0.2, 0.2, 0.0));
+                let [predicted, measured] = [2.0 - 0.5 * (clutter - boxes), seen[0][Part::All as usize].mean * PI];
+                out.note(format!(
+                    "{fit:?}, `r_thresh` 0.05: of the rays from the floor the clutter stops {clutter:.4} and its boxes {boxes:.4}, hence view 0 \
+                     is {predicted:.4}; measured {measured:.4}."
+                ));
+            }
             for (i, [.., l]) in seen.into_iter().enumerate() {
                 between(out, &format!("pi L of view {i}, r_thresh {r}, {fit:?}"), least_pixel, most, l.times(PI));
             }
