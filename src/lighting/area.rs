@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use glam::{DMat3, DVec3, Vec2, Vec3};
 
-use super::bilinear::Bilinear;
+use super::bilinear::{Bilinear, RectanglePoint, SeenRectangle};
 use super::spherical::{Rectangle, Triangle, uniform_triangle};
 use crate::backend::Hit;
 use crate::scene::{Alpha, Material, Scene, TextureSlot};
@@ -49,6 +49,8 @@ pub(super) struct AreaLight {
     area: f64,
     /// The triangle, or both of a rectangle (the second `Hit::NONE` for a triangle).
     pub triangles: [u32; 2],
+    /// The edges and their cross product in single precision, for points of view that are far enough.
+    rough: [Vec3; 3],
     /// What only rectangles have.
     rectangle: Option<RectangleFrame>,
     /// Mean emitted radiance.
@@ -85,7 +87,9 @@ pub(super) struct AreaPoint {
 /// A point on a light source as seen from where it lights.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Seen {
-    pub point: AreaPoint,
+    pub triangle: u32,
+    /// Barycentric weights of the triangle's second and third vertex.
+    pub uv: Vec2,
     /// Unit vector to the point. As good where the difference of the positions would be lost in rounding.
     pub direction: Vec3,
     pub distance: f32,
@@ -95,13 +99,21 @@ pub(super) struct Seen {
 
 /// How points of a light source are chosen from one point of view.
 #[derive(Clone, Copy, Debug)]
-enum View {
+pub(super) enum View {
+    /// From afar: uniformly by area.
     Area,
-    /// With the first corner as seen from the point of view, and the edges.
-    Bilinear(Bilinear, Vec3, [Vec3; 2]),
-    /// In its frame: columns are its axes and the direction from the point of view to its plane.
-    Rectangle(Rectangle, DMat3, f64),
-    Triangle(Triangle, f64),
+    /// A rectangle at some distance: with a bilinear density.
+    Bilinear(SeenRectangle),
+    /// From close by: uniformly by solid angle. On which side of its plane the point of view is, positive on the counter-clockwise one.
+    SolidAngle(f64),
+}
+
+/// A light source that is close, as seen from the point of view.
+#[derive(Clone, Copy, Debug)]
+enum Near {
+    /// Columns are the rectangle's axes and the direction from the point of view to its plane.
+    Rectangle(Rectangle, DMat3),
+    Triangle(Triangle),
 }
 
 impl AreaLight {
@@ -139,8 +151,8 @@ impl AreaLight {
     }
 
     /// Radiance emitted at a point of one of its triangles.
-    pub(super) fn radiance_at(&self, scene: &Scene, point: &AreaPoint) -> Vec3 {
-        if self.varies { emission(scene, point.triangle, point.uv.x, point.uv.y) } else { self.radiance }
+    pub(super) fn radiance_at(&self, scene: &Scene, triangle: u32, uv: Vec2) -> Vec3 {
+        if self.varies { emission(scene, triangle, uv.x, uv.y) } else { self.radiance }
     }
 
     /// A uniform point; continuous in `u` on rectangles.
@@ -149,56 +161,91 @@ impl AreaLight {
         self.at(if self.is_rectangle() { u } else { uniform_triangle(u) })
     }
 
-    /// A point as seen from `position` on a surface with unit `normal` (zero: from all around). `None` from the dark side or
-    /// from edge-on.
-    pub(super) fn sample(&self, position: DVec3, normal: Vec3, u: [f32; 2]) -> Option<Seen> {
-        let (point, offset, density) = match self.view(position, normal)? {
-            View::Bilinear(density, corner, [e, f]) => {
-                let at = density.sample(u);
-                // From three radii away f32 is as good as the position is
-                let offset = corner + at[0] * e + at[1] * f;
-                let d2 = offset.length_squared();
-                let distance = d2.sqrt();
-                let direction = offset / distance;
-                let density = f64::from(density.at(at) * d2) / f64::from(direction.dot(self.cross.as_vec3()).abs());
-                let point = self.at(at.map(f64::from));
-                let usable = density.is_finite() && density > 0.0;
-                return usable.then_some(Seen { point, direction, distance, density });
+    /// How points on it are chosen for `position` on a surface with unit `normal` (zero: from all around). `None` from the dark
+    /// side and from edge-on.
+    pub(super) fn view(&self, position: DVec3, normal: Vec3) -> Option<View> {
+        let corner = self.corner - position;
+        let side = -corner.dot(self.cross);
+        if !(side > 0.0 || (side < 0.0 && self.both_faces)) {
+            return None;
+        }
+        let (d2, r2) = ((self.centre - position).length_squared(), self.radius * self.radius);
+        Some(if d2 > FAR_SQUARED * r2 {
+            View::Area
+        } else if self.is_rectangle() && d2 > BILINEAR_SQUARED * r2 {
+            // From that far away f32 is as good as the position is
+            let [e, f, cross] = self.rough;
+            View::Bilinear(SeenRectangle { corner: corner.as_vec3(), edges: [e, f], cross, normal })
+        } else {
+            View::SolidAngle(side)
+        })
+    }
+
+    /// A point as seen from `position`. `None` from edge-on.
+    pub(super) fn sample(&self, position: DVec3, view: &View, u: [f32; 2]) -> Option<Seen> {
+        match view {
+            View::Bilinear(seen) => self.seen_bilinear(&seen.sample(u)),
+            View::Area => self.sample_area(position, u),
+            View::SolidAngle(side) => {
+                let (near, angle) = self.near(self.corner - position, *side)?;
+                // Also where NaN
+                let sharp = angle >= MIN_SOLID_ANGLE;
+                if sharp { Some(self.sample_near(position, near, angle, u)) } else { self.sample_area(position, u) }
             }
-            View::Area => {
-                let point = self.uniform_point(u);
-                let offset = point.position - position;
-                (point, offset, self.area_density(offset)?)
-            }
-            View::Rectangle(rectangle, axes, angle) => {
-                let [x, y] = rectangle.sample(angle, u.map(f64::from));
-                let share = |v: f64, [v0, v1]: [f64; 2]| ((v - v0) / (v1 - v0)).clamp(0.0, 1.0);
-                let point = self.at([share(x, rectangle.x), share(y, rectangle.y)]);
-                (point, axes * DVec3::new(x, y, rectangle.z), 1.0 / angle)
-            }
-            View::Triangle(triangle, angle) => {
-                let (direction, weights) = triangle.sample(angle, u.map(f64::from));
-                let distance = (self.corner - position).dot(self.cross) / direction.dot(self.cross);
-                // No point is farther than the corners; a direction within rounding of the plane may say so (or NaN)
-                let distance = distance.abs().min(triangle.farthest());
-                (self.at(weights), distance * direction, 1.0 / angle)
-            }
-        };
-        let distance = offset.length();
-        Some(Seen { point, direction: (offset / distance).as_vec3(), distance: distance as f32, density })
+        }
     }
 
     /// Density per solid angle with which [`AreaLight::sample`] chooses the point at `offset` from `position`.
     pub(super) fn density(&self, position: DVec3, normal: Vec3, offset: DVec3) -> f64 {
+        let by_area = || self.area_density(offset).unwrap_or(0.0);
         match self.view(position, normal) {
             None => 0.0,
-            Some(View::Bilinear(density, ..)) => {
+            Some(View::Area) => by_area(),
+            Some(View::Bilinear(seen)) => {
                 let from_corner = position + offset - self.corner;
                 let at = self.edges.map(|e| (from_corner.dot(e) / e.length_squared()).clamp(0.0, 1.0) as f32);
-                self.area_density(offset).unwrap_or(0.0) * f64::from(density.at(at))
+                by_area() * f64::from(Bilinear::new(seen.corner, seen.edges, normal).at(at))
             }
-            Some(View::Area) => self.area_density(offset).unwrap_or(0.0),
-            Some(View::Rectangle(_, _, angle) | View::Triangle(_, angle)) => 1.0 / angle,
+            Some(View::SolidAngle(side)) => match self.near(self.corner - position, side) {
+                None => 0.0,
+                Some((_, angle)) if angle >= MIN_SOLID_ANGLE => 1.0 / angle,
+                Some(_) => by_area(),
+            },
+        }
+    }
+
+    /// A point chosen with a bilinear density. `None` from edge-on.
+    pub(super) fn seen_bilinear(
+        &self,
+        &RectanglePoint { at, direction, distance, density }: &RectanglePoint,
+    ) -> Option<Seen> {
+        let (triangle, uv) = self.place(at.map(f64::from));
+        let usable = density.is_finite() && density > 0.0;
+        usable.then_some(Seen { triangle, uv, direction, distance, density: f64::from(density) })
+    }
+
+    fn sample_area(&self, position: DVec3, u: [f32; 2]) -> Option<Seen> {
+        let point = self.uniform_point(u);
+        let offset = point.position - position;
+        Some(seen((point.triangle, point.uv), offset, self.area_density(offset)?))
+    }
+
+    fn sample_near(&self, position: DVec3, near: Near, angle: f64, u: [f32; 2]) -> Seen {
+        let u = u.map(f64::from);
+        match near {
+            Near::Rectangle(rectangle, axes) => {
+                let [x, y] = rectangle.sample(angle, u);
+                let share = |v: f64, [v0, v1]: [f64; 2]| ((v - v0) / (v1 - v0)).clamp(0.0, 1.0);
+                let place = self.place([share(x, rectangle.x), share(y, rectangle.y)]);
+                seen(place, axes * DVec3::new(x, y, rectangle.z), 1.0 / angle)
+            }
+            Near::Triangle(triangle) => {
+                let (direction, weights) = triangle.sample(angle, u);
+                let distance = (self.corner - position).dot(self.cross) / direction.dot(self.cross);
+                // No point is farther than the corners; a direction within rounding of the plane may say so (or NaN)
+                let distance = distance.abs().min(triangle.farthest());
+                seen(self.place(weights), distance * direction, 1.0 / angle)
+            }
         }
     }
 
@@ -211,59 +258,45 @@ impl AreaLight {
         (density.is_finite() && density > 0.0).then_some(density)
     }
 
-    /// Whether it is sampled with a bilinear density from there, unless it is even farther.
-    pub(super) fn is_bilinear_from(&self, position: DVec3) -> bool {
-        self.is_rectangle() && (self.centre - position).length_squared() > BILINEAR_SQUARED * self.radius * self.radius
-    }
-
-    fn view(&self, position: DVec3, normal: Vec3) -> Option<View> {
-        let corner = self.corner - position;
-        // Positive on the counter-clockwise side
-        let side = -corner.dot(self.cross);
-        if side == 0.0 || (side < 0.0 && !self.both_faces) {
-            return None;
-        }
-        let (d2, r2) = ((self.centre - position).length_squared(), self.radius * self.radius);
-        if d2 > FAR_SQUARED * r2 {
-            return Some(View::Area);
-        }
-        if self.is_bilinear_from(position) {
-            let [e, f] = self.edges.map(DVec3::as_vec3);
-            let corner = corner.as_vec3();
-            let density = Bilinear::new([corner, corner + e, corner + f, corner + e + f], side as f32, normal);
-            return Some(View::Bilinear(density, corner, [e, f]));
-        }
-        let (view, angle) = if let Some(RectangleFrame { x, y, normal, lengths, .. }) = self.rectangle {
+    /// What it looks like from close by, and its solid angle. `None` on the light itself.
+    fn near(&self, corner: DVec3, side: f64) -> Option<(Near, f64)> {
+        let (near, angle) = if let Some(RectangleFrame { x, y, normal, lengths, .. }) = self.rectangle {
             let (x0, y0) = (corner.dot(x), corner.dot(y));
             let z = corner.dot(normal).abs();
             let rectangle = Rectangle { x: [x0, x0 + lengths[0]], y: [y0, y0 + lengths[1]], z };
-            let angle = rectangle.solid_angle();
-            (View::Rectangle(rectangle, DMat3::from_cols(x, y, -side.signum() * normal), angle), angle)
+            let axes = DMat3::from_cols(x, y, -side.signum() * normal);
+            (Near::Rectangle(rectangle, axes), rectangle.solid_angle())
         } else {
             let triangle = Triangle::new(corner, self.edges, self.cross);
-            let angle = triangle.solid_angle();
-            (View::Triangle(triangle, angle), angle)
+            (Near::Triangle(triangle), triangle.solid_angle())
         };
-        if angle > TAU - ON_THE_LIGHT {
-            return None;
-        }
-        // Also where NaN
-        Some(if angle >= MIN_SOLID_ANGLE { view } else { View::Area })
+        (angle <= TAU - ON_THE_LIGHT || angle.is_nan()).then_some((near, angle))
     }
 
     /// The point `corner + s e0 + t e1`.
     fn at(&self, [s, t]: [f64; 2]) -> AreaPoint {
-        let position = self.corner + s * self.edges[0] + t * self.edges[1];
+        let (triangle, uv) = self.place([s, t]);
+        AreaPoint { position: self.corner + s * self.edges[0] + t * self.edges[1], triangle, uv }
+    }
+
+    /// Its triangle, and the barycentric weights of the triangle's second and third vertex.
+    fn place(&self, [s, t]: [f64; 2]) -> (u32, Vec2) {
         let Some(frame) = &self.rectangle else {
-            return AreaPoint { position, triangle: self.triangles[0], uv: Vec2::new(s as f32, t as f32) };
+            return (self.triangles[0], Vec2::new(s as f32, t as f32));
         };
         // Weights of the right-angled corner and, counter-clockwise, of the other two
         let half = usize::from(s + t > 1.0);
         let weights = if half == 0 { [1.0 - s - t, s, t] } else { [s + t - 1.0, 1.0 - s, 1.0 - t] };
         let right = usize::from(frame.right_corner[half]);
         let weight = |vertex: usize| weights[(vertex + 3 - right) % 3] as f32;
-        AreaPoint { position, triangle: self.triangles[half], uv: Vec2::new(weight(1), weight(2)) }
+        (self.triangles[half], Vec2::new(weight(1), weight(2)))
     }
+}
+
+/// A point at `offset` from where it is seen.
+fn seen((triangle, uv): (u32, Vec2), offset: DVec3, density: f64) -> Seen {
+    let distance = offset.length();
+    Seen { triangle, uv, direction: (offset / distance).as_vec3(), distance: distance as f32, density }
 }
 
 /// The light sources with area of a scene.
@@ -338,6 +371,7 @@ fn triangle_light(scene: &Scene, triangle: u32) -> Option<AreaLight> {
         corner: a,
         edges,
         cross,
+        rough: rough(edges, cross),
         centre,
         radius,
         area,
@@ -347,6 +381,10 @@ fn triangle_light(scene: &Scene, triangle: u32) -> Option<AreaLight> {
         varies: varies(material),
         both_faces: material.double_sided,
     })
+}
+
+fn rough([e, f]: [DVec3; 2], cross: DVec3) -> [Vec3; 3] {
+    [e, f, cross].map(DVec3::as_vec3)
 }
 
 /// Whether emission or presence differ from point to point.
@@ -468,6 +506,7 @@ fn rectangle_light(scene: &Scene, first: &AreaLight, second: &AreaLight, right_c
         corner: a,
         edges,
         cross,
+        rough: rough(edges, cross),
         centre: 0.5 * (b + c),
         radius: 0.5 * b.distance(c),
         area: cross.length(),

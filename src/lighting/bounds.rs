@@ -169,6 +169,8 @@ pub(super) struct Emitters {
     dark: [f32; LANES],
     /// One where light leaves into the opposite directions, too; else zero.
     both: [f32; LANES],
+    /// Whether the cone of any lane holds more than its axis.
+    cones: bool,
 }
 
 impl Emitters {
@@ -183,6 +185,7 @@ impl Emitters {
         cos_e: [1.0; LANES],
         dark: [f32::INFINITY; LANES],
         both: [0.0; LANES],
+        cones: false,
     };
 
     /// Puts an emitter into a lane.
@@ -199,12 +202,25 @@ impl Emitters {
         self.cos_e[lane] = cone.cos_e;
         let one_sided = emitter.flat && !cone.both;
         self.dark[lane] = if one_sided { SIDE_MARGIN * SIDE_MARGIN } else { f32::INFINITY };
+        self.cones |= cone.cos_o < 1.0;
         self.both[lane] = f32::from(u8::from(cone.both));
     }
 
     /// Estimates of the irradiance at `position` on a surface with unit `normal` (zero: on any), occlusion left out. Zero
     /// only where nothing can arrive.
+    ///
+    /// Over the sphere of a light whose radius appears under the angle b, cosines differ from the centre's by at most
+    /// `w = sin b + sin^2 b`; what counts is the mean of their positive parts, as if they were spread evenly.
     pub(super) fn importance(&self, position: Vec3, normal: Vec3) -> [f32; LANES] {
+        if self.cones {
+            self.importance_of::<true>(position, normal)
+        } else {
+            self.importance_of::<false>(position, normal)
+        }
+    }
+
+    /// `CONES`: whether any lane emits within a cone around more directions than one.
+    fn importance_of<const CONES: bool>(&self, position: Vec3, normal: Vec3) -> [f32; LANES] {
         let mut importance = [0.0; LANES];
         let any_side = f32::from(u8::from(normal == Vec3::ZERO));
         for (i, value) in importance.iter_mut().enumerate() {
@@ -222,16 +238,17 @@ impl Emitters {
             // The margin keeps points whose side is lost in rounding
             let behind = height < 0.0 && height * height > self.dark[i] * d2;
             let sin_b = radius * inverse;
-            let cos_b = sin(sin_b);
+            let w = sin_b + sin_b * sin_b;
+            let scale = 0.25 / larger(w, f32::MIN_POSITIVE);
             let along = height * inverse;
             let cos_w = if self.both[i] > 0.0 { along.abs() } else { along };
-            let cos_x = cos_of_difference(cos_w, sin(cos_w), self.cos_o[i], self.sin_o[i]);
-            let cos_p = cos_of_difference(cos_x, sin(cos_x), cos_b, sin_b);
+            let cos_x = if CONES { cos_of_difference(cos_w, sin(cos_w), self.cos_o[i], self.sin_o[i]) } else { cos_w };
             let cos_i = -(x * normal.x + y * normal.y + z * normal.z) * inverse;
-            let cos_r = larger(cos_of_difference(cos_i, sin(cos_i), cos_b, sin_b), any_side);
             // Not `<=`: inside a spot's cone both are 1
-            let dark = cos_p < self.cos_e[i] || cos_r <= 0.0;
-            let outside = if dark { 0.0 } else { estimate * cos_p * cos_r };
+            let dark = smaller(cos_x + w, 1.0) < self.cos_e[i];
+            let leaving = mean_positive(cos_x, w, scale);
+            let arriving = larger(mean_positive(cos_i, w, scale), any_side);
+            let outside = if dark { 0.0 } else { estimate * leaving * arriving };
             let value_here = if near { estimate } else { outside };
             *value = if behind { 0.0 } else { value_here };
         }
@@ -245,8 +262,22 @@ fn sin(cos: f32) -> f32 {
 }
 
 /// As `f32::max`, for numbers: one instruction.
-fn larger(a: f32, b: f32) -> f32 {
+#[inline(always)]
+pub(super) fn larger(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
+}
+
+/// Mean of the positive part of numbers spread evenly within `w` of `x`; `scale` is 1 / (4 w).
+#[inline(always)]
+fn mean_positive(x: f32, w: f32, scale: f32) -> f32 {
+    let positive = larger(x + w, 0.0);
+    if x < w { positive * positive * scale } else { x }
+}
+
+/// As `f32::min`, for numbers: one instruction.
+#[inline(always)]
+fn smaller(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
 }
 
 /// `cos(max(0, a - b))` for angles in 0..pi.

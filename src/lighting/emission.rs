@@ -136,7 +136,7 @@ impl Lights {
             let direction = (basis(normal) * cosine_hemisphere(Vec2::new(v, u[4]))).normalize();
             let faces = if light.both_faces { 2.0 } else { 1.0 };
             let extent = std::f64::consts::PI * light.area() * faces / probability;
-            let flux = (light.radiance_at(scene, &point).as_dvec3() * extent).as_vec3();
+            let flux = (light.radiance_at(scene, point.triangle, point.uv).as_dvec3() * extent).as_vec3();
             let ray = Ray::new(point.position.as_vec3(), direction);
             let emitted = EmittedRay { ray, flux, triangle: point.triangle, uv: point.uv, front };
             return (flux.max_element() > 0.0).then_some(emitted);

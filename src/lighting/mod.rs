@@ -22,7 +22,8 @@ use glam::Vec3;
 use crate::backend::{Hit, RayScene};
 use crate::sampling::{hash_all, unit};
 use crate::scene::{Aabb, LightKind, PunctualLight, Scene};
-use area::{AreaLight, AreaLights, Seen};
+use area::{AreaLight, AreaLights, Seen, View};
+use bilinear::Rectangles;
 use bounds::{Bounds, Cone, Emitter};
 use emission::FluxTable;
 pub use emission::{EmittedRay, EmittingTriangle};
@@ -30,7 +31,7 @@ use environment::EnvironmentLight;
 use tree::{Leaf, LightTree};
 
 /// A sampled light source, seen from a point.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightSample {
     /// Unit direction from the point to the light.
     pub direction: Vec3,
@@ -59,6 +60,25 @@ pub struct Lights {
     environment: Option<EnvironmentLight>,
     emission: FluxTable,
     dropped: usize,
+}
+
+/// A surface point that asks for light.
+#[derive(Clone, Copy, Debug)]
+pub struct Lit {
+    /// Where it is.
+    pub position: Vec3,
+    /// Unit shading normal on the side that is lit: samples from below are `None`. Zero asks for light from all directions.
+    pub normal: Vec3,
+    /// Random numbers in 0..1: the first chooses the light, the others the point on it.
+    pub u: [f32; 3],
+}
+
+/// What a point asks for light.
+enum Choice<'a> {
+    /// A light without area, and what arrives from there.
+    Sampled(LightSample),
+    /// A light with area, and how points on it are chosen.
+    Area { light: &'a AreaLight, probability: f64, view: View },
 }
 
 /// Probability of each kind of light at a point.
@@ -105,42 +125,73 @@ impl Lights {
         self.dropped
     }
 
-    /// Samples a light for a surface point with shading normal `normal` (on the side that is lit).
-    /// `u[0]` chooses the light, `u[1..3]` the point on it. `None` when nothing can arrive from the chosen light.
-    ///
-    /// A zero `normal` asks for light from all directions; otherwise samples from below the surface are `None`.
-    pub fn sample(&self, scene: &Scene, position: Vec3, normal: Vec3, u: [f32; 3]) -> Option<LightSample> {
+    /// Samples a light for one point. `None` when nothing can arrive from the chosen light.
+    pub fn sample(&self, scene: &Scene, lit: &Lit) -> Option<LightSample> {
+        match self.choose(lit)? {
+            Choice::Sampled(sample) => Some(sample),
+            Choice::Area { light, probability, view } => {
+                let seen = light.sample(lit.position.as_dvec3(), &view, [lit.u[1], lit.u[2]])?;
+                area_sample(scene, light, &seen, probability, lit.normal)
+            }
+        }
+    }
+
+    /// Samples a light for each of many points: the same samples as one by one, sooner.
+    pub fn sample_all(&self, scene: &Scene, lit: &[Lit], samples: &mut Vec<Option<LightSample>>) {
+        samples.clear();
+        samples.resize(lit.len(), None);
+        let mut rectangles = Rectangles::default();
+        let mut waiting: Vec<(usize, &AreaLight, f64)> = Vec::with_capacity(bilinear::LANES);
+        for (i, point) in lit.iter().enumerate() {
+            let u = [point.u[1], point.u[2]];
+            match self.choose(point) {
+                None => {}
+                Some(Choice::Sampled(sample)) => samples[i] = Some(sample),
+                Some(Choice::Area { light, probability, view: View::Bilinear(seen) }) => {
+                    rectangles.push(&seen, u);
+                    waiting.push((i, light, probability));
+                }
+                Some(Choice::Area { light, probability, view }) => {
+                    let seen = light.sample(point.position.as_dvec3(), &view, u);
+                    samples[i] = seen.and_then(|seen| area_sample(scene, light, &seen, probability, point.normal));
+                }
+            }
+            if waiting.len() == bilinear::LANES || i + 1 == lit.len() {
+                for ((i, light, probability), point) in waiting.drain(..).zip(rectangles.sample()) {
+                    let seen = light.seen_bilinear(&point);
+                    samples[i] = seen.and_then(|seen| area_sample(scene, light, &seen, probability, lit[i].normal));
+                }
+            }
+        }
+    }
+
+    /// Which light a point asks, and for lights without area what arrives from there.
+    fn choose(&self, lit: &Lit) -> Option<Choice<'_>> {
+        let &Lit { position, normal, u } = lit;
         let choice = refined(u[0], [u[1], u[2]]);
         let kinds = self.kinds(position, normal)?;
         let within = |below: f64, share: f64| ((choice - below) / share).clamp(0.0, 1.0 - f64::EPSILON);
         if choice >= kinds.finite + kinds.directional {
             let choice = within(kinds.finite + kinds.directional, kinds.environment);
-            return self.sample_environment(position, normal, choice, [u[1], u[2]], kinds.environment);
+            let sample = self.sample_environment(position, normal, choice, [u[1], u[2]], kinds.environment);
+            return sample.map(Choice::Sampled);
         }
         if choice >= kinds.finite {
-            return self.sample_directional(normal, within(kinds.finite, kinds.directional), kinds.directional);
+            let sample = self.sample_directional(normal, within(kinds.finite, kinds.directional), kinds.directional);
+            return sample.map(Choice::Sampled);
         }
         let (light, probability) = self.tree.sample(position, normal, within(0.0, kinds.finite))?;
         let probability = probability * kinds.finite;
         let light = light as usize;
-        let Some(area) = self.areas.lights.get(light) else {
-            let light = &self.finite[light - self.areas.lights.len()];
-            let (direction, distance, irradiance) = punctual::incident(light, position)?;
-            let weight = irradiance / probability as f32;
-            return above(normal, direction).then_some(LightSample {
-                direction,
-                distance,
-                weight,
-                pdf: None,
-                triangle: Hit::NONE,
-            });
-        };
-        let from = position.as_dvec3();
-        let Seen { point, direction, distance, density } = area.sample(from, normal, [u[1], u[2]])?;
-        let pdf = density * probability;
-        let weight = area.radiance_at(scene, &point) * (1.0 / pdf) as f32;
-        let usable = above(normal, direction) && weight.is_finite() && weight.max_element() > 0.0;
-        usable.then_some(LightSample { direction, distance, weight, pdf: Some(pdf as f32), triangle: point.triangle })
+        if let Some(light) = self.areas.lights.get(light) {
+            let view = light.view(position.as_dvec3(), normal)?;
+            return Some(Choice::Area { light, probability, view });
+        }
+        let light = &self.finite[light - self.areas.lights.len()];
+        let (direction, distance, irradiance) = punctual::incident(light, position)?;
+        let weight = irradiance / probability as f32;
+        let sample = LightSample { direction, distance, weight, pdf: None, triangle: Hit::NONE };
+        above(normal, direction).then_some(Choice::Sampled(sample))
     }
 
     /// Density per solid angle with which [`Lights::sample`] would have chosen `direction` towards `triangle`, which a ray
@@ -251,6 +302,15 @@ impl Lights {
             triangle: Hit::NONE,
         })
     }
+}
+
+/// What arrives from a point on a light that was chosen with `probability`. `None` from below the surface.
+fn area_sample(scene: &Scene, light: &AreaLight, seen: &Seen, probability: f64, normal: Vec3) -> Option<LightSample> {
+    let &Seen { triangle, uv, direction, distance, density } = seen;
+    let pdf = density * probability;
+    let weight = light.radiance_at(scene, triangle, uv) * (1.0 / pdf) as f32;
+    let usable = above(normal, direction) && weight.is_finite() && weight.max_element() > 0.0;
+    usable.then_some(LightSample { direction, distance, weight, pdf: Some(pdf as f32), triangle })
 }
 
 /// Unit direction to a directional light; zero for others.

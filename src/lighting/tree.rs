@@ -143,12 +143,13 @@ impl LightTree {
     }
 }
 
-fn running_sums(importance: &[f32; LANES]) -> [f32; LANES] {
-    let mut sum = 0.0;
-    importance.map(|value| {
-        sum += value;
-        sum
-    })
+/// Sums of the first one, two, .. eight values. Added up so that no sum waits for more than three others; each is at least as large as the
+/// one before, and the same where nothing was added.
+fn running_sums(&[a, b, c, d, e, f, g, h]: &[f32; LANES]) -> [f32; LANES] {
+    let ab = a + b;
+    let abcd = ab + (c + d);
+    let ef = e + f;
+    [a, ab, ab + c, abcd, abcd + e, abcd + ef, abcd + (ef + g), abcd + (ef + (g + h))]
 }
 
 fn bounds(leaves: &[Leaf], group: &[u32]) -> Bounds {

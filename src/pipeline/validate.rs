@@ -9,7 +9,7 @@ use super::{BackendKind, Method, Settings, auto};
 use crate::backend::compare::{Comparison, compare};
 use crate::backend::{Coherence, Hit, Ray, RayBackend, RayScene, TriangleSet, Visible};
 use crate::error::{Error, Result};
-use crate::lighting::Lights;
+use crate::lighting::{Lights, Lit};
 use crate::progress::Progress;
 use crate::sampling::{basis, cosine_hemisphere, hash_all, sobol};
 use crate::scene::alpha::AlphaFilter;
@@ -219,7 +219,8 @@ impl Source<'_> {
         let normal = point.geometric_normal;
         let normal = if normal.dot(view.direction) < 0.0 { normal } else { -normal };
         if kind == RayKind::Shadow {
-            let light = self.lights.sample(self.scene, point.position, normal, [u[0], u[1], u[2]])?;
+            let lit = Lit { position: point.position, normal, u: [u[0], u[1], u[2]] };
+            let light = self.lights.sample(self.scene, &lit)?;
             let ray = Ray::new(point.ray_origin(light.direction), light.direction);
             return Some(Ray { t_far: light.distance * (1.0 - SHADOW_MARGIN), ..ray });
         }

@@ -7,6 +7,7 @@ use super::RadiosityScene;
 use super::patches::Patches;
 use super::shoot::side_normal;
 use crate::backend::{Coherence, Ray};
+use crate::lighting::Lit;
 use crate::lighting::shadow::{ShadowBuffers, ShadowRay, light_visibility};
 use crate::sampling;
 
@@ -152,7 +153,8 @@ fn sample(
     let choice = sampling::sobol(index, 1, stream)[0];
     let point = patches.open_point(input.geometry, side, [s[0], s[1]]);
     let normal = side_normal(&point, side);
-    let light = input.lights.sample(input.scene, point.position, normal, [choice, s[2], s[3]])?;
+    let lit = Lit { position: point.position, normal, u: [choice, s[2], s[3]] };
+    let light = input.lights.sample(input.scene, &lit)?;
     let cos = light.direction.dot(normal);
     if cos <= 0.0 || light.weight.max_element() <= 0.0 {
         return None;

@@ -23,13 +23,13 @@ use glam::Vec3;
 use super::cache::IrradianceCache;
 use super::film::{Feature, Tile};
 use super::nearness::Nearness;
-use super::path::{Arrival, Passes, Path, Shadow};
+use super::path::{Arrival, Met, Passes, Path, Shadow};
 use super::view::ViewRays;
 use super::workspace::Workspace;
 use crate::backend::edge::settle_edges;
 use crate::backend::{Coherence, Hit, Ray, RayScene, Visible};
-use crate::lighting::Lights;
 use crate::lighting::shadow::{ShadowRay, light_visibility};
+use crate::lighting::{LightSample, Lights, Lit};
 use crate::radiosity::Solution;
 use crate::sampling::sobol;
 use crate::scene::{Camera, Scene};
@@ -49,8 +49,8 @@ const CERTAIN_DEPTH: u32 = 32;
 /// path alive: between walls of 0.99, a smaller one makes rare paths arbitrarily bright.
 const CERTAIN_SURVIVAL: f32 = 0.999;
 
-/// Random numbers of one path: one block of four for the camera, then two for each scattering event.
-const BLOCKS_PER_EVENT: u32 = 2;
+/// Points that are shaded together: as many as stay close to the processor.
+const MET_AT_ONCE: usize = 64;
 
 /// Share of paths that gather rough reflection apart from diffuse, per unit of its albedo.
 const PATHS_PER_ALBEDO: f32 = 4.0;
@@ -144,8 +144,7 @@ impl<'a> World<'a> {
         ws.start(trials);
         let view = ViewRays::new(camera, image_size, batch.seed);
         for i in 0..pixels as u32 {
-            let trial = |t| view.path(tile.pixel(i), batch.first + t, i * batch.trials + t);
-            ws.paths.extend((0..batch.trials).map(trial));
+            ws.paths.extend(view.paths(tile.pixel(i), batch.first, batch.trials, i * batch.trials));
         }
         ws.features.clear();
         if features {
@@ -257,7 +256,7 @@ impl<'a> World<'a> {
             if hit.is_hit() {
                 ws.note_distance(index, hit.t);
                 ws.note_near(index);
-                self.shade(ws, index, &hit, None, passes, capture);
+                self.meet(ws, index, &hit, None, passes, capture);
             } else if ws.paths[index as usize].near.is_finite() {
                 // The rest of the ray meets the simplified scene.
                 let path = &mut ws.paths[index as usize];
@@ -267,6 +266,7 @@ impl<'a> World<'a> {
                 self.escape(ws, index);
             }
         }
+        self.shade_all(ws, passes, capture);
     }
 
     /// Traces the far list in the simplified scene and looks radiosities up.
@@ -289,6 +289,7 @@ impl<'a> World<'a> {
                 self.escape(ws, index);
             }
         }
+        self.shade_all(ws, passes, capture);
     }
 
     /// A ray left the scene. What it sees of the environment counts as emission that it meets.
@@ -338,12 +339,12 @@ impl<'a> World<'a> {
         }
         // The triangle is the same one in the detailed scene.
         let look_up = (!near).then_some(hit.triangle);
-        self.shade(ws, index, &Hit { triangle, ..*hit }, look_up, passes, capture);
+        self.meet(ws, index, &Hit { triangle, ..*hit }, look_up, passes, capture);
     }
 
     /// A ray met a surface of the scene. `look_up`: what is weakly directional there comes from the radiosity of this triangle
     /// of the simplified geometry.
-    fn shade(
+    fn meet(
         &self,
         ws: &mut Workspace,
         index: u32,
@@ -352,11 +353,52 @@ impl<'a> World<'a> {
         passes: Passes,
         capture: &mut Option<&mut Vec<Captured>>,
     ) {
-        let path = ws.paths[index as usize];
-        let trial = path.trial as usize;
+        let path = &ws.paths[index as usize];
         let point = SurfacePoint::new(self.scene, hit);
+        let wanted = if path.gathers { passes.lores } else { passes.hires };
+        let lit = look_up.is_none() && wanted && path.depth < self.max_depth && !self.lights.is_empty();
+        if lit {
+            let [choice, u, v, _] = sobol(path.index, path.block(), path.stream);
+            let normal = point.shading_normal_towards(-path.ray.direction);
+            ws.lit.push(Lit { position: point.position, normal, u: [choice, u, v] });
+        }
+        ws.met.push(Met { path: index, hit: *hit, look_up, point, lit });
+        if ws.met.len() == MET_AT_ONCE {
+            self.shade_all(ws, passes, capture);
+        }
+    }
+
+    /// Samples light for what was met, and shades it.
+    fn shade_all(&self, ws: &mut Workspace, passes: Passes, capture: &mut Option<&mut Vec<Captured>>) {
+        self.lights.sample_all(self.scene, &ws.lit, &mut ws.lights);
+        let mut next = 0;
+        for i in 0..ws.met.len() {
+            let met = ws.met[i];
+            let mut light = None;
+            if met.lit {
+                light = ws.lights[next];
+                next += 1;
+            }
+            self.shade(ws, &met, light.as_ref(), passes, capture);
+        }
+        ws.met.clear();
+        ws.lit.clear();
+    }
+
+    /// Emission, light from a sampled light source, and how the path goes on.
+    fn shade(
+        &self,
+        ws: &mut Workspace,
+        met: &Met,
+        light: Option<&LightSample>,
+        passes: Passes,
+        capture: &mut Option<&mut Vec<Captured>>,
+    ) {
+        let &Met { hit, look_up, point, .. } = met;
+        let path = ws.paths[met.path as usize];
+        let trial = path.trial as usize;
         let outgoing = -path.ray.direction;
-        let front = point.geometric_normal.dot(outgoing) > 0.0;
+        let facing = point.shading_normal_towards(outgoing);
         let lobes = match look_up {
             // The radiosity solution reflects everything diffusely that is no perfect mirror.
             Some(_) => Lobes::MIRRORS,
@@ -367,7 +409,7 @@ impl<'a> World<'a> {
 
         let emission = bsdf.emission();
         if emission != Vec3::ZERO {
-            let radiance = path.throughput * emission * self.emission_share(&path, hit);
+            let radiance = path.throughput * emission * self.emission_share(&path, &hit);
             let sum = if path.gathers { &mut ws.lores[trial] } else { &mut ws.hires[trial] };
             *sum += radiance;
         }
@@ -375,8 +417,7 @@ impl<'a> World<'a> {
         if path.depth == 0
             && let Some(feature) = ws.features.get_mut(trial)
         {
-            let normal = if front { point.shading_normal } else { -point.shading_normal };
-            *feature = Feature { albedo: low + high, normal, depth: hit.t, hits: 1, ..Feature::default() };
+            *feature = Feature { albedo: low + high, normal: facing, depth: hit.t, hits: 1, ..Feature::default() };
             if let Some(simplified) = self.simplified {
                 feature.classify(simplified, hit.triangle);
             }
@@ -385,12 +426,8 @@ impl<'a> World<'a> {
             return;
         }
 
-        let block = 1 + path.depth * BLOCKS_PER_EVENT;
-        let facing = if front { point.shading_normal } else { -point.shading_normal };
-        let wanted = if path.gathers { passes.lores } else { passes.hires };
-        if look_up.is_none() && wanted && !self.lights.is_empty() {
-            let u = sobol(path.index, block, path.stream);
-            self.sample_lights(ws, &path, &point, facing, &bsdf, [u[0], u[1], u[2]]);
+        if let Some(light) = light {
+            shine(ws, &path, &point, &bsdf, light);
         }
 
         // Share of paths that gather the rest when the diffuse part came from the cache.
@@ -412,7 +449,7 @@ impl<'a> World<'a> {
 
         let choose_high = choose_high(low, high);
         let goes_on = look_up.is_none() && passes.lores && low != Vec3::ZERO;
-        let u = if choose_high > 0.0 || goes_on { sobol(path.index, block + 1, path.stream) } else { [0.0; 4] };
+        let u = if choose_high > 0.0 || goes_on { sobol(path.index, path.block() + 1, path.stream) } else { [0.0; 4] };
         if u[3] < choose_high {
             let Some(sample) = bsdf.sample_high([u[0], u[1], u[2]]) else { return };
             let arrival = match (sample.straight, sample.pdf) {
@@ -433,7 +470,7 @@ impl<'a> World<'a> {
         }
         let throughput = path.throughput / (1.0 - choose_high);
         if let (Some(triangle), Some(far)) = (look_up, &self.far) {
-            ws.lores[trial] += throughput * far.reflected(&Hit { triangle, ..*hit }, path.ray.direction);
+            ws.lores[trial] += throughput * far.reflected(&Hit { triangle, ..hit }, path.ray.direction);
             return;
         }
         if !goes_on {
@@ -483,29 +520,6 @@ impl<'a> World<'a> {
         }
     }
 
-    /// Next-event estimation: one shadow ray to one light source.
-    fn sample_lights(
-        &self,
-        ws: &mut Workspace,
-        path: &Path,
-        point: &SurfacePoint,
-        normal: Vec3,
-        bsdf: &Bsdf,
-        u: [f32; 3],
-    ) {
-        let Some(light) = self.lights.sample(self.scene, point.position, normal, u) else { return };
-        let (high, high_pdf) = bsdf.eval_high(light.direction);
-        let high_share = light.pdf.map_or(1.0, |pdf| pdf / (pdf + high_pdf));
-        let scattered = bsdf.eval_low(light.direction) + high * high_share;
-        let radiance = path.throughput * scattered * light.weight;
-        if radiance == Vec3::ZERO {
-            return;
-        }
-        let ray = Ray { t_far: light.distance, ..Ray::new(point.ray_origin(light.direction), light.direction) };
-        ws.shadow_rays.push(ShadowRay { ray, light: light.triangle });
-        ws.shadows.push(Shadow { radiance, trial: path.trial, gathers: path.gathers });
-    }
-
     /// Traces all shadow rays of the round and adds what arrives.
     fn trace_shadows(&self, ws: &mut Workspace, coherence: Coherence) {
         ws.transmittance.resize(ws.shadow_rays.len(), Vec3::ZERO);
@@ -521,6 +535,20 @@ impl<'a> World<'a> {
             }
         }
     }
+}
+
+/// Next-event estimation: a shadow ray to a sampled light source.
+fn shine(ws: &mut Workspace, path: &Path, point: &SurfacePoint, bsdf: &Bsdf, light: &LightSample) {
+    let (high, high_pdf) = bsdf.eval_high(light.direction);
+    let high_share = light.pdf.map_or(1.0, |pdf| pdf / (pdf + high_pdf));
+    let scattered = bsdf.eval_low(light.direction) + high * high_share;
+    let radiance = path.throughput * scattered * light.weight;
+    if radiance == Vec3::ZERO {
+        return;
+    }
+    let ray = Ray { t_far: light.distance, ..Ray::new(point.ray_origin(light.direction), light.direction) };
+    ws.shadow_rays.push(ShadowRay { ray, light: light.triangle });
+    ws.shadows.push(Shadow { radiance, trial: path.trial, gathers: path.gathers });
 }
 
 /// Ends a path that brings little, or strengthens it by as much as others end; `u` in 0..1. Nothing is lost on average.

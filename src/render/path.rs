@@ -2,7 +2,11 @@
 
 use glam::Vec3;
 
-use crate::backend::Ray;
+use crate::backend::{Hit, Ray};
+use crate::shading::SurfacePoint;
+
+/// Blocks of four random numbers for each scattering event: one for light, one for the path.
+const BLOCKS_PER_EVENT: u32 = 2;
 
 /// Which passes a batch of trials feeds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -80,6 +84,11 @@ impl Path {
             stream,
         }
     }
+
+    /// The first of this scattering event's blocks of random numbers; the camera has the block before the first event's.
+    pub(super) fn block(&self) -> u32 {
+        1 + self.depth * BLOCKS_PER_EVENT
+    }
 }
 
 /// A shadow ray and what it brings when nothing is in its way.
@@ -91,4 +100,19 @@ pub struct Shadow {
     pub trial: u32,
     /// Whether it goes to LORES.
     pub gathers: bool,
+}
+
+/// Where a path's ray met a surface of the scene.
+#[derive(Clone, Copy, Debug)]
+pub struct Met {
+    /// Index of the path in its batch.
+    pub path: u32,
+    /// The hit.
+    pub hit: Hit,
+    /// The triangle of the simplified geometry from whose radiosity comes what is weakly directional there.
+    pub look_up: Option<u32>,
+    /// The point.
+    pub point: SurfacePoint,
+    /// Whether its light is sampled.
+    pub lit: bool,
 }

@@ -26,11 +26,25 @@ impl ViewRays {
     }
 
     /// Trial `number` of a pixel (column, row); `trial` is the path's place in its batch.
-    ///
+    pub fn path(&self, pixel: [u32; 2], number: u32, trial: u32) -> Path {
+        self.path_in(self.stream(pixel, number & 1), pixel, number >> 1, trial)
+    }
+
+    /// Trials of a pixel from number `first` on, which take the places from `place` on in their batch.
+    pub fn paths(&self, pixel: [u32; 2], first: u32, count: u32, place: u32) -> impl Iterator<Item = Path> {
+        let streams = [0, 1].map(|half| self.stream(pixel, half));
+        (0..count).map(move |t| {
+            let number = first + t;
+            self.path_in(streams[(number & 1) as usize], pixel, number >> 1, place + t)
+        })
+    }
+
     /// Even and odd trials come from two independent scramblings, so that their difference measures the error.
-    pub fn path(&self, [x, y]: [u32; 2], number: u32, trial: u32) -> Path {
-        let stream = hash_all(&[y * self.size[0] + x, number & 1, self.seed]);
-        let index = number >> 1;
+    fn stream(&self, [x, y]: [u32; 2], half: u32) -> u32 {
+        hash_all(&[y * self.size[0] + x, half, self.seed])
+    }
+
+    fn path_in(&self, stream: u32, [x, y]: [u32; 2], index: u32, trial: u32) -> Path {
         let u = sobol(index, 0, stream);
         let size = Vec2::new(self.size[0] as f32, self.size[1] as f32);
         let film = (Vec2::new(x as f32, y as f32) + Vec2::new(u[0], u[1])) / size;

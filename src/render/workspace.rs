@@ -3,10 +3,11 @@
 use glam::Vec3;
 
 use super::film::Feature;
-use super::path::{Path, Shadow};
+use super::path::{Met, Path, Shadow};
 use super::tally::{PassTimes, RayCounts};
 use crate::backend::{Hit, Ray};
 use crate::lighting::shadow::{ShadowBuffers, ShadowRay};
+use crate::lighting::{LightSample, Lit};
 
 /// Buffers of one thread, reused from batch to batch.
 #[derive(Default)]
@@ -18,6 +19,10 @@ pub struct Workspace {
     pub(super) rays: Vec<Ray>,
     pub(super) hits: Vec<Hit>,
     pub(super) far: Vec<u32>,
+    /// What is shaded next, with a light sample for each that is lit.
+    pub(super) met: Vec<Met>,
+    pub(super) lit: Vec<Lit>,
+    pub(super) lights: Vec<Option<LightSample>>,
     pub(super) shadows: Vec<Shadow>,
     pub(super) shadow_rays: Vec<ShadowRay>,
     pub(super) shadow_buffers: ShadowBuffers,

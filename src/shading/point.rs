@@ -95,6 +95,11 @@ impl SurfacePoint {
         }
     }
 
+    /// The shading normal on the side of the surface that `outgoing` points to.
+    pub fn shading_normal_towards(&self, outgoing: Vec3) -> Vec3 {
+        if self.geometric_normal.dot(outgoing) > 0.0 { self.shading_normal } else { -self.shading_normal }
+    }
+
     /// Origin for a ray that leaves into `direction`: moved along the geometric normal to the side of `direction`
     /// by the error bound, and rounded away from the surface (pbrt 4ed 6.8.6).
     pub fn ray_origin(&self, direction: Vec3) -> Vec3 {

@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::super::area::{AreaLight, AreaLights, Seen};
+use super::super::area::{AreaLight, AreaLights, Seen, View};
 use super::*;
 use crate::scene::texture::{Texels, Wrap};
 use crate::scene::{Alpha, Texture, TextureSlot};
@@ -218,7 +218,8 @@ fn uniform_in_solid_angle() {
         }
         let total: f64 = expected.iter().sum();
         // Smaller ones and rectangles far away are sampled by other densities, on purpose
-        if total < 2e-7 || light.is_bilinear_from(DVec3::ZERO) {
+        let view = light.view(DVec3::ZERO, Vec3::ZERO);
+        if total < 2e-7 || !matches!(view, None | Some(View::SolidAngle(_))) {
             continue;
         }
         // Corners up to 3 from the origin are rounded, the fourth of a rectangle may leave the plane by twice that
@@ -228,11 +229,10 @@ fn uniform_in_solid_angle() {
         let mut counts = [0_u32; 32];
         for k in 0..n {
             let u = [random(30 + i, k, 0), random(30 + i, k, 1)];
-            let Some(Seen { point, density, .. }) = light.sample(DVec3::ZERO, Vec3::ZERO, u) else {
-                panic!("shape {i} does not face")
-            };
+            let seen = view.as_ref().and_then(|view| light.sample(DVec3::ZERO, view, u));
+            let Some(Seen { direction, distance, density, .. }) = seen else { panic!("shape {i} does not face") };
             assert!((density * total - 1.0).abs() < rounding, "shape {i}: {density} {total}");
-            let offset = point.position - a;
+            let offset = direction.as_dvec3() * f64::from(distance) - a;
             // Coordinates along two edges that need not be perpendicular
             let (ee, ff, ef) = (e.dot(e), f.dot(f), e.dot(f));
             let (oe, of) = (offset.dot(e), offset.dot(f));
@@ -324,7 +324,7 @@ fn degenerate_places() {
                     // Also the ends of the range
                     u[1] = [u[1], 0.0, 1.0 - f32::EPSILON / 2.0][i as usize % 3];
                     u[2] = [u[2], 0.0, 1.0 - f32::EPSILON / 2.0][i as usize / 3 % 3];
-                    let Some(s) = lights.sample(&scene, place, normal, u) else { continue };
+                    let Some(s) = lights.sample(&scene, &Lit { position: place, normal, u }) else { continue };
                     let pdf = s.pdf.unwrap();
                     assert!(pdf > 0.0 && s.weight.is_finite() && s.weight.min_element() >= 0.0, "{place} {s:?}");
                     assert!(s.direction.is_normalized() && s.distance >= 0.0, "{place} {s:?}");
@@ -340,6 +340,7 @@ fn degenerate_places() {
 /// the order of vertices and triangles.
 #[test]
 fn rectangles_are_joined_and_keep_strata() {
+    const ROUNDING: f64 = 1e-6;
     let corners = [Vec3::ZERO, Vec3::X, Vec3::new(1.0, 2.0, 0.0), 2.0 * Vec3::Y];
     for turn in 0..4 {
         for [first, second] in [[[0, 1, 2], [0, 2, 3]], [[1, 2, 0], [3, 0, 2]], [[2, 3, 0], [1, 2, 0]]] {
@@ -350,20 +351,24 @@ fn rectangles_are_joined_and_keep_strata() {
             assert_eq!(lights.len(), 1);
             for i in 0..100 {
                 let u = [random(8, i, 0), random(8, i, 1)];
-                let Seen { point, .. } = lights[0].sample(DVec3::new(0.3, 0.2, 1.0), Vec3::ZERO, u).unwrap();
-                // The barycentric weights name the same point
-                let [a, b, c] = scene.mesh.corners(point.triangle).map(Vec3::as_dvec3);
-                let [v, w] = point.uv.to_array().map(f64::from);
-                let named = (1.0 - v - w) * a + v * b + w * c;
-                assert!(named.distance(point.position) < 1e-6, "{named} {}", point.position);
-                let Seen { point: right, .. } =
-                    lights[0].sample(DVec3::new(0.3, 0.2, 1.0), Vec3::ZERO, [0.5 * (u[0] + 1.0), u[1]]).unwrap();
-                let Seen { point: up, .. } =
-                    lights[0].sample(DVec3::new(0.3, 0.2, 1.0), Vec3::ZERO, [u[0], 0.5 * (u[1] + 1.0)]).unwrap();
+                let from = DVec3::new(0.3, 0.2, 1.0);
+                let view = lights[0].view(from, Vec3::ZERO).unwrap();
+                let point = |u: [f32; 2]| {
+                    let Seen { triangle, uv, direction, distance, .. } = lights[0].sample(from, &view, u).unwrap();
+                    let [a, b, c] = scene.mesh.corners(triangle).map(Vec3::as_dvec3);
+                    let [v, w] = uv.to_array().map(f64::from);
+                    let named = (1.0 - v - w) * a + v * b + w * c;
+                    // The barycentric weights name the same point, up to the rounding of directions and distances around 1
+                    let position = from + direction.as_dvec3() * f64::from(distance);
+                    assert!(named.distance(position) < ROUNDING, "{named} {position}");
+                    named
+                };
+                let right = point([0.5 * (u[0] + 1.0), u[1]]);
+                let up = point([u[0], 0.5 * (u[1] + 1.0)]);
                 // One coordinate does not depend on the second number; the other does not fall
-                let (across, along) = (right.position - point.position, up.position - point.position);
+                let (across, along) = (right - point(u), up - point(u));
                 let axis = usize::from(along.x.abs() > along.y.abs());
-                assert!(along[axis].abs() < 1e-12 && along[1 - axis] != 0.0, "{along}");
+                assert!(along[axis].abs() < ROUNDING && along[1 - axis] != 0.0, "{along}");
                 assert!(across[axis] != 0.0);
             }
         }
@@ -392,7 +397,7 @@ fn useless_lights_are_dropped() {
     let lights = Lights::new(&scene);
     assert!(lights.is_empty());
     assert_eq!(lights.dropped(), 2);
-    assert!(lights.sample(&scene, Vec3::Z, Vec3::ZERO, [0.5; 3]).is_none());
+    assert!(lights.sample(&scene, &Lit { position: Vec3::Z, normal: Vec3::ZERO, u: [0.5; 3] }).is_none());
     assert_eq!(lights.pdf(&scene, Vec3::Z, Vec3::ZERO, Vec3::NEG_Z, 1.0, 0), 0.0);
     assert!(lights.sample_emission(&scene, [0.5; 5]).is_none());
     assert_eq!(lights.flux(), [0.0; 3]);
@@ -434,4 +439,33 @@ fn textured_light() {
         lights.sample_emission(&scene, u).map_or(0.0, |e| f64::from(e.flux.x))
     }));
     shot.assert_near(flux, 1e-3, "shot");
+}
+
+/// Many points at once get what each gets alone, bit for bit.
+#[test]
+fn samples_do_not_depend_on_company() {
+    let square =
+        |x: f32, size: f32| points([[x, 0.0, 3.0], [x, size, 3.0], [x + size, size, 3.0], [x + size, 0.0, 3.0]]);
+    let triangle = points([[-3.0, 0.0, 2.0], [-3.0, 1.0, 2.0], [-2.0, 0.0, 2.0]]);
+    let shapes = [square(0.0, 1.0), square(2.0, 0.5), square(-2.0, 0.001), square(-8.0, 5.0), triangle];
+    let polygons: Vec<_> = shapes.into_iter().map(|shape| (shape, emitter(1.0))).collect();
+    let lamp = LightKind::Point { position: Vec3::new(1.0, -2.0, 2.0) };
+    let scene = scene(&polygons, &[(lamp, Vec3::ONE), (LightKind::Directional { direction: Vec3::NEG_Z }, Vec3::ONE)]);
+    let lights = Lights::new(&scene);
+    let lit: Vec<Lit> = (0..1001)
+        .map(|i| {
+            let normal = if i % 7 == 0 { Vec3::ZERO } else { random_point(41, i).normalize() };
+            Lit { position: random_point(40, i), normal, u: random3(42, i, 0) }
+        })
+        .collect();
+    let mut together = Vec::new();
+    lights.sample_all(&scene, &lit, &mut together);
+    let mut kinds = [0; 3];
+    for (lit, together) in lit.iter().zip(&together) {
+        let alone = lights.sample(&scene, lit);
+        assert_eq!(alone, *together, "{lit:?}");
+        let kind = together.map_or(0, |sample| if sample.pdf.is_some() { 2 } else { 1 });
+        kinds[kind] += 1;
+    }
+    assert!(kinds.iter().all(|&count| count > 50), "{kinds:?}");
 }

@@ -124,7 +124,7 @@ fn density_of_samples() {
         for i in 0..2000 {
             let position = 4.0 * random_point(70, i);
             let normal = if i % 4 == 0 { Vec3::ZERO } else { random_point(71, i).normalize() };
-            let Some(s) = lights.sample(&scene, position, normal, random3(72, i, 0)) else { continue };
+            let Some(s) = lights.sample(&scene, &Lit { position, normal, u: random3(72, i, 0) }) else { continue };
             let Some(pdf) = s.pdf else { continue };
             let again = lights.pdf(&scene, position, normal, s.direction, s.distance, s.triangle);
             // Chosen by area, the density is 1 / cosine at the light: of a direction rounded to f32

@@ -85,7 +85,7 @@ fn shot_light_arrives_where_gathered() {
     }));
     let gathered = Estimate::of((0..n).map(|i| {
         let at = Vec3::new(random(4, i, 3), random(4, i, 4), 0.0);
-        let s = lights.sample(&scene, at, Vec3::Z, random3(4, i, 0));
+        let s = lights.sample(&scene, &Lit { position: at, normal: Vec3::Z, u: random3(4, i, 0) });
         s.map_or(0.0, |s| f64::from(s.weight.x) * f64::from(s.direction.z))
     }));
     let error = shot.error.hypot(gathered.error);

@@ -111,7 +111,7 @@ fn densities_are_those_of_samples_and_add_up() {
             let n = 1 << 14;
             let (mut from_sun, mut missed) = (0, 0);
             for k in 0..n {
-                match lights.sample(&scene, Vec3::ZERO, normal, random3(98, k, i)) {
+                match lights.sample(&scene, &Lit { position: Vec3::ZERO, normal, u: random3(98, k, i) }) {
                     None => missed += 1,
                     Some(s) => {
                         let from_middle =
@@ -170,7 +170,7 @@ fn shot_light_from_outside_arrives_where_gathered() {
         if t > 0.0 && e.ray.direction.y < 0.0 && p.x.abs().max(p.z.abs()) < 0.5 { f64::from(e.flux.y) } else { 0.0 }
     }));
     let gathered = Estimate::of((0..n).map(|i| {
-        let s = lights.sample(&scene, Vec3::ZERO, Vec3::Y, random3(102, i, 0));
+        let s = lights.sample(&scene, &Lit { position: Vec3::ZERO, normal: Vec3::Y, u: random3(102, i, 0) });
         s.map_or(0.0, |s| f64::from(s.weight.y) * f64::from(s.direction.y))
     }));
     let error = shot.error.hypot(gathered.error);
@@ -210,7 +210,7 @@ fn looking_out_finds_the_window() {
     let mut lights = Lights::new(&room);
     let irradiance = |lights: &Lights, position: Vec3, normal: Vec3, seed: u32| {
         Estimate::of((0..1 << 13).map(|i| {
-            let Some(s) = lights.sample(&room, position, normal, random3(seed, i, 0)) else { return 0.0 };
+            let Some(s) = lights.sample(&room, &Lit { position, normal, u: random3(seed, i, 0) }) else { return 0.0 };
             let mut blocked = [true];
             let ray = Ray::new(position + 1e-4 * normal, s.direction);
             rays.occluded(&[ray], Visible::All, Coherence::Incoherent, &mut blocked);
@@ -242,5 +242,5 @@ fn black_surroundings_are_no_light() {
     let lights = Lights::new(&scene);
     assert!(lights.is_empty());
     assert_eq!(lights.outside(Vec3::X), Vec3::ZERO);
-    assert!(lights.sample(&scene, Vec3::ZERO, Vec3::Y, [0.5; 3]).is_none());
+    assert!(lights.sample(&scene, &Lit { position: Vec3::ZERO, normal: Vec3::Y, u: [0.5; 3] }).is_none());
 }

@@ -9,7 +9,7 @@ mod punctual;
 
 use glam::{DVec3, Mat3, Vec3};
 
-use super::Lights;
+use super::{Lights, Lit};
 use crate::backend::PartKind;
 use crate::sampling::{hash_all, unit};
 use crate::scene::{LightKind, Material, Mesh, Object, PunctualLight, Scene};
@@ -99,7 +99,7 @@ impl Estimate {
 /// Irradiance estimate in the first band from `n` samples.
 fn irradiance(scene: &Scene, position: Vec3, normal: Vec3, n: u32, seed: u32) -> Estimate {
     let lights = Lights::new(scene);
-    Estimate::of((0..n).map(|i| match lights.sample(scene, position, normal, random3(seed, i, 0)) {
+    Estimate::of((0..n).map(|i| match lights.sample(scene, &Lit { position, normal, u: random3(seed, i, 0) }) {
         None => 0.0,
         Some(s) => {
             assert!((s.direction.length() - 1.0).abs() < 1e-6);

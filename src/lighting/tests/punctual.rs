@@ -67,7 +67,7 @@ fn directional_lights() {
     let lights = Lights::new(&scene);
     let band = |b: usize| {
         Estimate::of((0..4096).map(|i| {
-            let s = lights.sample(&scene, Vec3::ZERO, Vec3::Z, random3(5, i, 0)).unwrap();
+            let s = lights.sample(&scene, &Lit { position: Vec3::ZERO, normal: Vec3::Z, u: random3(5, i, 0) }).unwrap();
             assert!(s.pdf.is_none() && s.distance == f32::INFINITY);
             f64::from(s.weight[b]) * f64::from(s.direction.z)
         }))
@@ -89,7 +89,7 @@ fn faint_band_is_served() {
     let scene = scene(&[], &all);
     let lights = Lights::new(&scene);
     let green = Estimate::of((0..4096).map(|i| {
-        let s = lights.sample(&scene, Vec3::ZERO, Vec3::Z, random3(6, i, 0));
+        let s = lights.sample(&scene, &Lit { position: Vec3::ZERO, normal: Vec3::Z, u: random3(6, i, 0) });
         s.map_or(0.0, |s| f64::from(s.weight.y) * f64::from(s.direction.z))
     }));
     green.assert_near(1e-6, 1e-6, "green");
