@@ -562,8 +562,8 @@ fn gsii_020_black_room(case: &Case, out: &mut Outcome<'_>) {
                 beta: 0.0645,
                 box_fit: fit,
                 patch_size: Some(1.0),
-                // A fifth of what is allowed for the mean of 16 seeds.
-                radiosity_error: 4e-3,
+                // The mean of 16 seeds is then far within what is allowed.
+                radiosity_error: 0.02,
                 seed,
                 ..Settings::default()
             };

@@ -253,7 +253,12 @@ fn spec_006_mirror_ball(case: &Case, out: &mut Outcome<'_>) {
             model.add(name, triangles.clone(), grey(BLACK));
         });
         let [radius, height] = screen;
-        model.add("screen", segments([0.5 * (1.0 - 1e-7), radius], 4096, height), grey(0.0));
+        // Three overlapping rings: one of long slivers would be slow.
+        for (k, (from, to, count)) in
+            [(1.0 - 1e-7, 1.005, 4096), (1.004, 1.05, 256), (1.04, 2.0 * radius, 16)].into_iter().enumerate()
+        {
+            model.add("screen", segments([0.5 * from, 0.5 * to], count, height + 1e-3 * k as f64), grey(0.0));
+        }
         model.sun(1.0, -DVec3::Z);
         let room = Room::new(model.finish());
         over_seeds(|seed| {
@@ -275,7 +280,7 @@ fn spec_006_mirror_ball(case: &Case, out: &mut Outcome<'_>) {
         edges.sort_by(f64::total_cmp);
         edges.dedup();
         let parts: Vec<_> = edges.windows(2).map(|w| (format!("up to {}", w[1]), ring(w[0], w[1]))).collect();
-        let flux = caustic(&parts, [1.01 * edges[edges.len() - 1], height], patch_size, rays);
+        let flux = caustic(&parts, [1.03 * edges[edges.len() - 1], height], patch_size, rays);
         let within = |r: f64| -> f64 {
             edges.windows(2).zip(&flux).skip(1).filter(|(w, _)| w[1] <= r).map(|(_, f)| f.mean).sum()
         };
@@ -293,7 +298,7 @@ fn spec_006_mirror_ball(case: &Case, out: &mut Outcome<'_>) {
         .filter(|t| (t[0] + t[1] + t[2]).z / 3.0 < 1.0 + 0.5 * 0.5_f64.sqrt())
         .map(|[a, b, c]| [a, c, b])
         .collect();
-    let total = caustic(&[("bowl".to_owned(), bowl)], [4.0, 1.36], 0.1, 1 << 20)[0];
+    let total = caustic(&[("bowl".to_owned(), bowl)], [4.1, 1.36], 0.1, 1 << 20)[0];
     let expected = case.values("/flux_total")[0];
     out.mean("all flux downward", expected, total, case.tolerance("/flux_rel") * expected);
 }
