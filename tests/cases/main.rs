@@ -4,6 +4,7 @@
 //! `cargo test --release --test cases -- FF RAD-01` runs the cases whose names contain one of the words. With
 //! `GSII_WRITE_ACCURACY=1` a complete run writes the table in `docs/accuracy.md`.
 
+mod box_fits;
 mod cie;
 #[path = "../common/mod.rs"]
 mod common;
@@ -46,6 +47,7 @@ fn recipe(id: &str) -> Option<Recipe> {
         direct_light::RECIPES,
         cie::RECIPES,
         specular::RECIPES,
+        box_fits::RECIPES,
         gsii::RECIPES,
         hard::RECIPES,
     ];

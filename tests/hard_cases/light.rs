@@ -155,6 +155,7 @@ fn lamps_of_two_sides_do_not_shine_on_themselves() {
     model.add("shade", diced([v(0., 0., 0.), v(1., 0., 0.125), v(1., 1., 0.25), v(0., 1., 0.125)], 8), shade);
     let room = Room::new(model.finish());
     for direct in [DirectLight::Shoot, DirectLight::Gather] {
+        // An end to the search for the relative error of what should be nothing.
         let params = RadiosityParams { direct, patch_size: 0.2, max_rays: 1 << 20, ..one_patch(0.1, 1) };
         let solution = room.solve(&params).unwrap();
         assert_eq!(room.mean(&solution, "shade"), 0.0, "{direct:?}: {:?}", solution.ledger);
