@@ -138,9 +138,10 @@ fn draw(world: &World<'_>, camera: &Camera, passes: Passes) -> (f64, u64) {
     let mut ws = Workspace::default();
     let start = Instant::now();
     for tile in &mut film.tiles {
+        let pixels: Vec<u32> = (0..tile.pixels.len() as u32).collect();
         for first in (0..TRIALS).step_by(BATCH_TRIALS as usize) {
-            let batch = Batch { first, trials: BATCH_TRIALS, passes, seed: 0 };
-            world.render_tile(&mut ws, camera, SIZE, batch, false, tile);
+            let batch = Batch { pixels: &pixels, first, trials: BATCH_TRIALS, passes, features: false, seed: 0 };
+            world.render_tile(&mut ws, camera, SIZE, batch, tile);
         }
     }
     (start.elapsed().as_secs_f64(), ws.counts.hires() + ws.counts.lores())

@@ -22,5 +22,6 @@ pub mod shading;
 pub mod simplify;
 pub mod srgb;
 pub mod study;
+pub mod unfinished;
 
 pub use error::{Error, Result};

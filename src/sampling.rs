@@ -1,8 +1,10 @@
 //! Random and low-discrepancy numbers, without state: every value is a function of seed, index and dimension.
 
 use std::f32::consts::PI;
+use std::sync::LazyLock;
 
 use glam::{Vec2, Vec3};
+use sobol_burley::parts::{self, Int4};
 
 /// Owen-scrambled Sobol points, four dimensions at a time, with values in 0..1.
 ///
@@ -13,7 +15,30 @@ pub fn sobol(index: u32, dimension: u32, stream: u32) -> [f32; 4] {
     const BLOCKS: u32 = sobol_burley::NUM_DIMENSION_SETS_4D;
     const INDICES: u32 = 1 << 16;
     let wrapped = (index / INDICES).wrapping_mul(0x9e37_79b9) ^ (dimension / BLOCKS).wrapping_mul(0x85eb_ca6b);
-    sobol_burley::sample_4d(index % INDICES, dimension % BLOCKS, hash(stream ^ wrapped))
+    sample_4d(index % INDICES, dimension % BLOCKS, hash(stream ^ wrapped))
+}
+
+/// Scrambles of the four dimensions of a block.
+const LANES: [u32; 4] = [0x912f_69ba, 0x174f_18ab, 0x691e_72ca, 0xb40c_c1b8];
+
+/// Points of the Sobol sequence, of which every other is a sum of four: by block of dimensions, quarter of the 16 bits of the index, and
+/// value of the quarter.
+static QUARTERS: LazyLock<Vec<[[Int4; 16]; 4]>> = LazyLock::new(|| {
+    let point = |block: u32, quarter: u32, value: u32| parts::sobol_int4_rev(value << (28 - 4 * quarter), block);
+    let quarter = |block: u32, quarter: u32| std::array::from_fn(|value| point(block, quarter, value as u32));
+    let block = |block: u32| std::array::from_fn(|q| quarter(block, q as u32));
+    (0..sobol_burley::NUM_DIMENSION_SETS_4D).map(block).collect()
+});
+
+/// The same as [`sobol_burley::sample_4d`], bit for bit, without going through the bits of the index one by one.
+fn sample_4d(index: u32, block: u32, seed: u32) -> [f32; 4] {
+    let shuffled = parts::owen_scramble_rev(index.reverse_bits(), parts::hash(seed ^ 0x79c6_8e4a));
+    let quarters = &QUARTERS[block as usize];
+    let of = |quarter: usize| quarters[quarter][(shuffled >> (28 - 4 * quarter)) as usize & 15];
+    let point = (of(0) ^ of(1)) ^ (of(2) ^ of(3));
+    let seed = seed.wrapping_mul(0x9c8f_2d3b) ^ block;
+    let scrambles = parts::hash_int4(LANES.map(|lane| lane ^ seed).into());
+    parts::owen_scramble_int4_rev(point, scrambles).reverse_bits().to_f32_norm()
 }
 
 /// A good 32-bit hash (Ettinger's two-round mixer).
@@ -82,4 +107,18 @@ pub fn basis(n: Vec3) -> glam::Mat3 {
         Vec3::new(b, sign + n.y * n.y * a, -n.y),
         n,
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_are_those_of_the_library() {
+        for i in 0..4096 {
+            let index = hash(i) >> if i < 2048 { 16 } else { 24 };
+            let (block, seed) = (hash(i ^ 7) % sobol_burley::NUM_DIMENSION_SETS_4D, hash(i ^ 9));
+            assert_eq!(sample_4d(index, block, seed), sobol_burley::sample_4d(index, block, seed));
+        }
+    }
 }

@@ -40,7 +40,7 @@ fn crops_have_the_bits_of_the_whole() {
     }
 }
 
-/// In an image of many tiles the pilot of a part looks only at a sample of the others.
+/// In an image of many tiles a part needs only a sample of the others.
 #[test]
 fn crops_of_large_images_have_the_bits_of_the_whole() {
     let (prepared, _) = prepare(&scene(&lit_room()), Settings { method: Method::Mcpt, ..Settings::default() });

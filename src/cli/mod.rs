@@ -2,6 +2,7 @@
 
 pub mod compare;
 pub mod info;
+pub mod long;
 pub mod manual;
 pub mod merge;
 pub mod options;
@@ -35,7 +36,7 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Render an image of a glTF scene
-    Render(render::Options),
+    Render(Box<render::Options>),
     /// Join the parts of an image that were rendered with --tile or --crop
     Merge(merge::Options),
     /// Show what is in a scene and what would be done with it

@@ -7,17 +7,20 @@ use std::time::Duration;
 
 use clap::Args;
 
+use super::long::{Checkpoint, LongOptions};
 use super::options::{MethodOptions, SceneOptions, Talk, load, set_threads};
 use super::output::{OutputOptions, names};
 use super::outside::OutsideOptions;
 use crate::clock::Stopwatch;
 use crate::error::{Error, Result};
 use crate::image::Metadata;
+use crate::pipeline::identity::identity;
 use crate::pipeline::{Method, Prepared, Stats, choose_camera};
 use crate::progress::Progress;
 use crate::render::layers::{Layer, develop};
-use crate::render::{Region, RenderParams, Rendering, World, bias};
+use crate::render::{Region, RenderParams, Rendering, Session, World, bias};
 use crate::scene::{Camera, Scene};
+use crate::unfinished;
 
 /// Pairs of paths that measure the bias when not said otherwise.
 const BIAS_SAMPLES: u32 = 1 << 15;
@@ -102,6 +105,8 @@ pub struct Options {
     #[arg(long, value_name = "FILE.json", help_heading = "Output")]
     stats: Option<PathBuf>,
     #[command(flatten)]
+    long: LongOptions,
+    #[command(flatten)]
     talk: Talk,
 }
 
@@ -112,6 +117,7 @@ pub struct Options {
 pub fn run(options: &Options) -> Result<ExitCode> {
     let start = Stopwatch::start();
     OutputOptions::check(&options.output.output)?;
+    options.long.check()?;
     set_threads(options.method.threads)?;
     let progress = options.talk.progress();
     stop_on_ctrl_c(&progress);
@@ -122,15 +128,17 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     let views = options.views(&scene)?;
     let params = views.iter().map(|view| options.render_params(&view.camera)).collect::<Result<Vec<_>>>()?;
     let cameras: Vec<Camera> = views.iter().map(|view| view.camera.clone()).collect();
+    // Before the preparation, which may take long: a checkpoint of something else is noticed at once.
+    let keep = |(view, params)| options.keep(&scene, &cameras, view, params);
+    let kept = views.iter().zip(&params).map(keep).collect::<Result<Vec<_>>>()?;
     let prepared = Prepared::for_cameras(scene, &cameras, options.method.settings(), &progress, &mut stats)?;
     for warning in &stats.warnings {
         log::warn!("{warning}");
     }
-    for (view, params) in views.iter().zip(&params) {
+    for ((view, params), kept) in views.iter().zip(&params).zip(kept) {
         // Times and counts of the preparation belong to every view.
         let mut stats = stats.clone();
-        if !options.render_view(&prepared, view, params, start, &progress, &mut stats)? {
-            options.talk.say("gsii: stopped before the first trial; nothing was written");
+        if !options.render_view(&prepared, view, params, kept.as_ref(), start, &progress, &mut stats)? {
             return Ok(ExitCode::FAILURE);
         }
         if progress.stopped() {
@@ -145,6 +153,7 @@ struct View {
     camera: Camera,
     outputs: Vec<PathBuf>,
     stats: Option<PathBuf>,
+    checkpoint: Option<PathBuf>,
 }
 
 /// The path with a camera's name before its extension.
@@ -163,7 +172,13 @@ impl Options {
     fn views(&self, scene: &Scene) -> Result<Vec<View>> {
         if self.scene.camera.as_deref() != Some(ALL_CAMERAS) {
             let camera = choose_camera(scene, self.scene.camera.as_deref())?.clone();
-            return Ok(vec![View { camera, outputs: self.output.output.clone(), stats: self.stats.clone() }]);
+            let checkpoint = self.long.checkpoint().map(Path::to_owned);
+            return Ok(vec![View {
+                camera,
+                outputs: self.output.output.clone(),
+                stats: self.stats.clone(),
+                checkpoint,
+            }]);
         }
         let harmless = |c: char| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' };
         let mut names: Vec<String> = Vec::new();
@@ -176,26 +191,49 @@ impl Options {
             let outputs: Vec<PathBuf> = self.output.output.iter().map(|path| of_camera(path, &name)).collect();
             OutputOptions::check(&outputs)?;
             let stats = self.stats.as_ref().map(|path| of_camera(path, &name));
-            views.push(View { camera: camera.clone(), outputs, stats });
+            let checkpoint = self.long.checkpoint().map(|path| of_camera(path, &name));
+            views.push(View { camera: camera.clone(), outputs, stats, checkpoint });
             names.push(name);
         }
         Ok(views)
     }
 
+    /// Where the rendering of a view is kept while it is not finished; `cameras` are those that the scene is prepared for.
+    fn keep(
+        &self,
+        scene: &Scene,
+        cameras: &[Camera],
+        view: &View,
+        params: &RenderParams,
+    ) -> Result<Option<Checkpoint>> {
+        let identity = || identity(scene, cameras, &view.camera, &self.method.settings(), params);
+        self.long.keep(&view.outputs[0], view.checkpoint.as_deref(), identity)
+    }
+
     /// Renders and writes one view. False when it was stopped before the first trial.
+    #[expect(clippy::too_many_arguments, reason = "all that a run has")]
     fn render_view(
         &self,
         prepared: &Prepared,
         view: &View,
         params: &RenderParams,
+        kept: Option<&Checkpoint>,
         start: Stopwatch,
         progress: &Progress,
         stats: &mut Stats,
     ) -> Result<bool> {
         let camera = &view.camera;
-        let rendering = prepared.render(camera, params, progress);
+        let session = self.long.session(kept, params)?;
+        let rendering = {
+            let mut stats = stats.clone();
+            let write = |session: &Session| self.write_partial(session, view, params, &mut stats);
+            let mut watchers = self.long.watchers(&view.outputs[0], kept, write);
+            prepared.resume(camera, params, session, progress, Some(&mut watchers))
+        };
         stats.record_rendering(&rendering);
+        let advice = kept.map_or_else(String::new, Checkpoint::advice);
         if rendering.film.pixels().all(|p| p.hires.trials() == 0) {
+            self.talk.say(format!("gsii: stopped before the first trial; no image was written{advice}"));
             return Ok(false);
         }
         self.measure_bias(prepared, camera, params, &rendering, stats);
@@ -209,8 +247,20 @@ impl Options {
         if let Some(path) = &view.stats {
             write_stats(path, stats)?;
         }
-        self.summarise(&view.outputs, stats, rendering.stopped);
+        if let Some(kept) = kept.filter(|_| !rendering.stopped) {
+            kept.remove()?;
+        }
+        self.summarise(&view.outputs, stats, rendering.stopped.then_some(advice.as_str()));
         Ok(true)
+    }
+
+    /// Writes the images of a rendering that is not finished.
+    fn write_partial(&self, session: &Session, view: &View, params: &RenderParams, stats: &mut Stats) -> Result<()> {
+        let film = session.film();
+        stats.record_film(&film);
+        self.record_parameters(&view.camera, params, true, stats)?;
+        let developed = develop(&film, self.layers());
+        self.output.write(&view.outputs, &developed, &metadata(stats))
     }
 
     fn render_params(&self, camera: &Camera) -> Result<RenderParams> {
@@ -285,7 +335,7 @@ impl Options {
             return;
         }
         let start = Stopwatch::start();
-        let world = World { cache: rendering.cache.as_ref(), ..prepared.world() };
+        let world = World { cache: rendering.cache.as_deref(), ..prepared.world() };
         let bias = bias::measure(&world, camera, params, self.measure_bias);
         stats.record_bias(&bias, &rendering.film);
         stats.record_time(start, |s| &mut s.bias);
@@ -319,13 +369,14 @@ impl Options {
         self.outside.record(map)
     }
 
-    fn summarise(&self, outputs: &[PathBuf], stats: &Stats, stopped: bool) {
+    /// `stopped` says what can be done about it.
+    fn summarise(&self, outputs: &[PathBuf], stats: &Stats, stopped: Option<&str>) {
         let s = &stats.seconds;
         let e = &stats.error;
         self.talk.say(format!(
             "{}{}: {:.1} s (load {:.1}, simplify {:.1}, build {:.1}, radiosity {:.1}, HIRES {:.1}, LORES {:.1})",
             names(outputs),
-            if stopped { " (stopped early, with the trials there were)" } else { "" },
+            stopped.map_or_else(String::new, |advice| format!(" (stopped early, with the trials there were{advice})")),
             s.total,
             s.load,
             s.simplify,
@@ -352,6 +403,7 @@ pub(super) fn stop_on_ctrl_c(progress: &Progress) {
     // Fails only when a handler exists already (several runs in one process): the first one stays.
     let _ = ctrlc::set_handler(move || {
         if progress.stopped() {
+            unfinished::remove_all();
             std::process::exit(1);
         }
         progress.stop();
@@ -389,12 +441,7 @@ fn metadata(stats: &Stats) -> Metadata {
 }
 
 fn write_stats(path: &Path, stats: &Stats) -> Result<()> {
-    let failed = |error: &dyn std::fmt::Display| Error::Output { path: path.to_owned(), reason: error.to_string() };
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let file = tempfile::NamedTempFile::new_in(folder).map_err(|e| failed(&e))?;
-    serde_json::to_writer_pretty(&file, stats).map_err(|e| failed(&e))?;
-    file.persist(path).map_err(|e| failed(&e.error))?;
-    Ok(())
+    unfinished::write(path, |file| Ok(serde_json::to_writer_pretty(file, stats)?))
 }
 
 /// Largest resident set of this process so far, bytes; 0 where the system does not tell.

@@ -1,6 +1,5 @@
 //! `gsii simplify`: the simplified scene, to be looked at and measured.
 
-use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
@@ -13,6 +12,7 @@ use crate::pipeline::{BackendKind, Method, Prepared, Settings, Stats, choose_cam
 use crate::radiosity::{self, Solution};
 use crate::scene::Scene;
 use crate::simplify::{BoxFit, Class, LONGEST_CLUSTER, Simplified, SimplifiedGeometry, export, report};
+use crate::unfinished;
 
 /// Options of `gsii simplify`.
 #[derive(Args, Debug)]
@@ -96,11 +96,11 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         log::warn!("{warning}");
     }
     if let Some(path) = &options.output {
-        write_file(path, |out| export::write(&scene, &simplified, solution.as_ref(), out))?;
+        unfinished::write(path, |out| export::write(&scene, &simplified, solution.as_ref(), out))?;
     }
     if let (Some(path), Some(format)) = (&options.report, table) {
         let rows = report::rows(&simplified);
-        write_file(path, |out| match format {
+        unfinished::write(path, |out| match format {
             Table::Csv => report::write_csv(&rows, out),
             Table::Json => report::write_json(&rows, out),
         })?;
@@ -180,17 +180,5 @@ fn print_table(
             mean(&|r| r.hidden)
         );
     }
-    Ok(())
-}
-
-/// Writes a file under a temporary name and renames it when it is complete.
-fn write_file(path: &Path, content: impl FnOnce(&mut BufWriter<&std::fs::File>) -> std::io::Result<()>) -> Result<()> {
-    let failed = |error: std::io::Error| Error::Output { path: path.to_owned(), reason: error.to_string() };
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let file = tempfile::NamedTempFile::new_in(folder).map_err(failed)?;
-    let mut out = BufWriter::new(file.as_file());
-    content(&mut out).and_then(|()| out.flush()).map_err(failed)?;
-    drop(out);
-    file.persist(path).map_err(|e| failed(e.error))?;
     Ok(())
 }

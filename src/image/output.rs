@@ -1,8 +1,6 @@
 //! Writing an image file: all of it or nothing.
 
-use std::path::{Path, PathBuf};
-
-use tempfile::NamedTempFile;
+use std::path::Path;
 
 use super::buffer::Image;
 use super::metadata::Metadata;
@@ -10,6 +8,7 @@ use super::oiio::{self, Layout, Samples};
 use super::view::ViewTransform;
 use crate::error::{Error, Result};
 use crate::sampling::{hash_all, unit};
+use crate::unfinished::Unfinished;
 
 /// What [`write()`] does to the values on their way to the file.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -127,12 +126,11 @@ pub fn check_writable(path: &Path) -> Result<()> {
 /// failure nothing has changed.
 pub fn write(path: &Path, image: &Image, metadata: &Metadata, options: &WriteOptions) -> Result<()> {
     let file = write_beside(path, image, metadata, options)?;
-    file.persist(path).map_err(|error| failure(path, error.error))?;
-    Ok(())
+    file.finish(path).map_err(|error| failure(path, error))
 }
 
 /// Writes to a temporary file in the folder of the target, which goes when it is dropped.
-fn write_beside(path: &Path, image: &Image, metadata: &Metadata, options: &WriteOptions) -> Result<NamedTempFile> {
+fn write_beside(path: &Path, image: &Image, metadata: &Metadata, options: &WriteOptions) -> Result<Unfinished> {
     let encoding = Encoding::of(path)?;
     let file = temporary(path)?;
     let size = (image.width(), image.height());
@@ -158,30 +156,19 @@ fn write_beside(path: &Path, image: &Image, metadata: &Metadata, options: &Write
     Ok(file)
 }
 
-fn temporary(path: &Path) -> Result<NamedTempFile> {
+fn temporary(path: &Path) -> Result<Unfinished> {
     match std::fs::metadata(path) {
         // A rename would replace a device or a pipe by a file.
         Ok(there) if !there.is_file() => return Err(failure(path, "something that is not a regular file is there")),
         Ok(there) if there.permissions().readonly() => return Err(failure(path, "it exists and is write-protected")),
         _ => (),
     }
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder.to_owned(),
-        _ => PathBuf::from("."),
-    };
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     if !folder.is_dir() {
         return Err(failure(path, format!("there is no folder {}", folder.display())));
     }
     // The extension stays: OpenImageIO chooses the format by it.
-    let suffix = format!(".{}", path.extension().unwrap_or_default().to_string_lossy());
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".gsii-").suffix(&suffix);
-    // Temporary files are private by default; this one becomes the image and is as open as the user's umask says.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    builder
-        .tempfile_in(&folder)
-        .map_err(|error| failure(path, format!("{} is not writable: {error}", folder.display())))
+    Unfinished::new(path).map_err(|error| failure(path, format!("{} is not writable: {error}", folder.display())))
 }
 
 /// Programs that know one image per file take the first channels.

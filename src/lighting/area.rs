@@ -167,6 +167,7 @@ impl AreaLight {
 
     /// How points on it are chosen for `position` on a surface with unit `normal` (zero: from all around). `None` from the dark
     /// side and from edge-on.
+    #[inline(always)]
     pub(super) fn view(&self, position: DVec3, normal: Vec3) -> Option<View> {
         let corner = self.corner - position;
         let side = -corner.dot(self.cross);

@@ -166,6 +166,7 @@ impl Lights {
     }
 
     /// Which light a point asks, and for lights without area what arrives from there.
+    #[inline(always)]
     fn choose(&self, lit: &Lit) -> Option<Choice<'_>> {
         let &Lit { position, normal, u } = lit;
         let choice = refined(u[0], [u[1], u[2]]);

@@ -1,6 +1,7 @@
 //! From a scene to everything the renderer needs, and the record of what was done.
 
 pub mod auto;
+pub mod identity;
 pub mod settings;
 pub mod stats;
 pub mod validate;
@@ -18,7 +19,7 @@ use crate::error::{Error, Result};
 use crate::lighting::Lights;
 use crate::progress::Progress;
 use crate::radiosity::{self, RadiosityParams, RadiosityScene, Solution};
-use crate::render::{self, FarField, Nearness, RenderParams, Rendering, Round, World};
+use crate::render::{self, FarField, Nearness, RenderParams, Rendering, Round, Session, Watcher, World};
 use crate::scene::{Camera, Scene};
 use crate::shading::Lobes;
 use crate::simplify::{self, Simplified, SimplifiedGeometry, SimplifyParams, TriangleSource};
@@ -129,10 +130,22 @@ impl Prepared {
 impl Prepared {
     /// Renders with the method that this was prepared for.
     pub fn render(&self, camera: &Camera, params: &RenderParams, progress: &Progress) -> Rendering {
+        self.resume(camera, params, Session::new(params), progress, None)
+    }
+
+    /// Goes on with a rendering while `watcher` looks at it; see [`render::resume`]. Radiosity is shown from the beginning, in one go.
+    pub fn resume(
+        &self,
+        camera: &Camera,
+        params: &RenderParams,
+        session: Session,
+        progress: &Progress,
+        watcher: Option<&mut dyn Watcher>,
+    ) -> Rendering {
         let world = self.world();
         match (self.settings.method, world.far) {
             (Method::Radiosity, Some(far)) => render::show::show_radiosity(&world, &far, camera, params),
-            _ => render::render(&world, camera, params, progress),
+            _ => render::resume(&world, camera, params, session, progress, watcher),
         }
     }
 

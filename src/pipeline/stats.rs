@@ -160,9 +160,14 @@ impl Stats {
         }
         self.rays.hires += rendering.rays.hires();
         self.rays.lores += rendering.rays.lores();
-        let errors = rendering.film.relative_errors();
+        self.record_film(&rendering.film);
+    }
+
+    /// Records how noisy an image is.
+    pub fn record_film(&mut self, film: &Film) {
+        let errors = film.relative_errors();
         (self.error.hires, self.error.lores, self.error.total) = (errors.hires, errors.lores, errors.total);
-        self.counts.dropped_trials = rendering.film.tiles.iter().map(|t| t.dropped).sum();
+        self.counts.dropped_trials = film.tiles.iter().map(|t| t.dropped).sum();
     }
 
     /// Records the bias meter, relative to the radiance of `film`.

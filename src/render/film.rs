@@ -1,7 +1,9 @@
 //! Where trials are added up: mean and standard error per pixel, band and pass.
 
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
 
+use super::tally::Tally;
 use crate::sampling::{hash_all, unit};
 use crate::simplify::{Class, Simplified};
 
@@ -9,7 +11,7 @@ use crate::simplify::{Class, Simplified};
 pub const TILE: u32 = 8;
 
 /// Running sums of one pass at one pixel, f64.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct PixelSum {
     sum: [f64; 3],
     square: [f64; 3],
@@ -72,7 +74,7 @@ impl PixelSum {
 }
 
 /// What the first visible surface looks like: of one trial, or summed over trials.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct Feature {
     /// Reflectance, all lobes.
     pub albedo: Vec3,
@@ -128,7 +130,7 @@ impl std::ops::AddAssign for Feature {
 }
 
 /// One pixel.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct Pixel {
     /// Emission, highly directional chains and direct light.
     pub hires: PixelSum,
@@ -136,6 +138,14 @@ pub struct Pixel {
     pub lores: PixelSum,
     /// The first visible surface.
     pub feature: Feature,
+}
+
+impl Pixel {
+    /// Radiance of both passes.
+    pub fn radiance(&self) -> Vec3 {
+        let sum = add(self.hires.mean(), self.lores.mean());
+        Vec3::from_array(sum.map(|band| band as f32))
+    }
 }
 
 /// A rectangle of pixels of an image.
@@ -190,6 +200,10 @@ pub struct Tile {
     pub pixels: Vec<Pixel>,
     /// Trials that were not finite and were dropped.
     pub dropped: u64,
+    /// The trial to go on with: those with smaller numbers are in the sums, as far as they are planned.
+    pub next: u32,
+    /// What it has cost.
+    pub tally: Tally,
 }
 
 impl Tile {
@@ -197,7 +211,8 @@ impl Tile {
     pub fn new(place: [u32; 2], size: [u32; 2]) -> Self {
         let origin = place.map(|p| p * TILE);
         let size = [0, 1].map(|axis| TILE.min(size[axis] - origin[axis]));
-        Tile { origin, size, pixels: vec![Pixel::default(); (size[0] * size[1]) as usize], dropped: 0 }
+        let pixels = vec![Pixel::default(); (size[0] * size[1]) as usize];
+        Tile { origin, size, pixels, dropped: 0, next: 0, tally: Tally::default() }
     }
 
     /// Column and row of its pixel number `i`.

@@ -50,7 +50,7 @@ const CERTAIN_DEPTH: u32 = 32;
 const CERTAIN_SURVIVAL: f32 = 0.999;
 
 /// Points that are shaded together: as many as stay close to the processor.
-const MET_AT_ONCE: usize = 64;
+const MET_AT_ONCE: usize = 256;
 
 /// Share of paths that gather rough reflection apart from diffuse, per unit of its albedo.
 const PATHS_PER_ALBEDO: f32 = 4.0;
@@ -117,14 +117,18 @@ impl FarField<'_> {
 
 /// A batch of trials of one tile.
 #[derive(Clone, Copy, Debug)]
-pub struct Batch {
+pub struct Batch<'a> {
+    /// Numbers of the pixels.
+    pub pixels: &'a [u32],
     /// Number of the first trial.
     pub first: u32,
     /// Number of trials for each pixel.
     pub trials: u32,
     /// Passes to feed.
     pub passes: Passes,
-    /// Seed; pilots use another one than the image.
+    /// Whether to record what view rays meet first.
+    pub features: bool,
+    /// Seed of the image.
     pub seed: u32,
 }
 
@@ -135,25 +139,24 @@ impl<'a> World<'a> {
         ws: &mut Workspace,
         camera: &Camera,
         image_size: [u32; 2],
-        batch: Batch,
-        features: bool,
+        batch: Batch<'_>,
         tile: &mut Tile,
     ) {
-        let pixels = tile.pixels.len();
-        let trials = pixels * batch.trials as usize;
+        let trials = batch.pixels.len() * batch.trials as usize;
         ws.start(trials);
         let view = ViewRays::new(camera, image_size, batch.seed);
-        for i in 0..pixels as u32 {
-            ws.paths.extend(view.paths(tile.pixel(i), batch.first, batch.trials, i * batch.trials));
+        for (place, &pixel) in (0..).zip(batch.pixels) {
+            ws.paths.extend(view.paths(tile.pixel(pixel), batch.first, batch.trials, place * batch.trials));
         }
         ws.features.clear();
-        if features {
+        if batch.features {
             ws.features.resize(trials, Feature::default());
         }
         self.run(ws, batch.passes, None);
-        for (i, pixel) in tile.pixels.iter_mut().enumerate() {
+        for (place, &pixel) in batch.pixels.iter().enumerate() {
+            let pixel = &mut tile.pixels[pixel as usize];
             for t in 0..batch.trials {
-                let trial = i * batch.trials as usize + t as usize;
+                let trial = place * batch.trials as usize + t as usize;
                 let (h, l) = (ws.hires[trial], ws.lores[trial]);
                 if !(h.is_finite() && l.is_finite()) {
                     tile.dropped += 1;
@@ -371,17 +374,15 @@ impl<'a> World<'a> {
     /// Samples light for what was met, and shades it.
     fn shade_all(&self, ws: &mut Workspace, passes: Passes, capture: &mut Option<&mut Vec<Captured>>) {
         self.lights.sample_all(self.scene, &ws.lit, &mut ws.lights);
-        let mut next = 0;
-        for i in 0..ws.met.len() {
-            let met = ws.met[i];
-            let mut light = None;
-            if met.lit {
-                light = ws.lights[next];
-                next += 1;
-            }
-            self.shade(ws, &met, light.as_ref(), passes, capture);
+        let (mut met, mut lights) = (std::mem::take(&mut ws.met), std::mem::take(&mut ws.lights));
+        let mut sampled = lights.drain(..);
+        for met in &met {
+            let light = if met.lit { sampled.next().flatten() } else { None };
+            self.shade(ws, met, light.as_ref(), passes, capture);
         }
-        ws.met.clear();
+        drop(sampled);
+        met.clear();
+        (ws.met, ws.lights) = (met, lights);
         ws.lit.clear();
     }
 
@@ -394,7 +395,7 @@ impl<'a> World<'a> {
         passes: Passes,
         capture: &mut Option<&mut Vec<Captured>>,
     ) {
-        let &Met { hit, look_up, point, .. } = met;
+        let &Met { ref hit, look_up, ref point, .. } = met;
         let path = ws.paths[met.path as usize];
         let trial = path.trial as usize;
         let outgoing = -path.ray.direction;
@@ -405,11 +406,11 @@ impl<'a> World<'a> {
             None if path.gathers => self.gather_lobes,
             None => Lobes { least_roughness: 0.0, ..self.gather_lobes },
         };
-        let bsdf = Bsdf::new(self.scene, &point, outgoing, lobes);
+        let bsdf = Bsdf::new(self.scene, point, outgoing, lobes);
 
         let emission = bsdf.emission();
         if emission != Vec3::ZERO {
-            let radiance = path.throughput * emission * self.emission_share(&path, &hit);
+            let radiance = path.throughput * emission * self.emission_share(&path, hit);
             let sum = if path.gathers { &mut ws.lores[trial] } else { &mut ws.hires[trial] };
             *sum += radiance;
         }
@@ -427,7 +428,7 @@ impl<'a> World<'a> {
         }
 
         if let Some(light) = light {
-            shine(ws, &path, &point, &bsdf, light);
+            shine(ws, &path, point, &bsdf, light);
         }
 
         // Share of paths that gather the rest when the diffuse part came from the cache.
@@ -470,7 +471,7 @@ impl<'a> World<'a> {
         }
         let throughput = path.throughput / (1.0 - choose_high);
         if let (Some(triangle), Some(far)) = (look_up, &self.far) {
-            ws.lores[trial] += throughput * far.reflected(&Hit { triangle, ..hit }, path.ray.direction);
+            ws.lores[trial] += throughput * far.reflected(&Hit { triangle, ..*hit }, path.ray.direction);
             return;
         }
         if !goes_on {
@@ -500,7 +501,7 @@ impl<'a> World<'a> {
         match (path.gathers, capture) {
             (false, Some(captured)) => {
                 let diffuse = bsdf.albedo_diffuse() != Vec3::ZERO;
-                captured.push(Captured { path: next, point, normal: facing, diffuse });
+                captured.push(Captured { path: next, point: *point, normal: facing, diffuse });
             }
             _ => ws.next.push(next),
         }

@@ -93,7 +93,7 @@ pub fn develop(film: &Film, layers: &[Layer]) -> Image {
     let mut image = Image::new(film.width, film.height);
     let rgb = |value: &dyn Fn(&Pixel) -> Vec3| film.pixels().map(value).collect::<Vec<_>>();
     let scalar = |value: &dyn Fn(&Pixel) -> f32| film.pixels().map(value).collect::<Vec<_>>();
-    image.push_rgb("", &rgb(&|p| sum(p.hires.mean(), p.lores.mean())));
+    image.push_rgb("", &rgb(&Pixel::radiance));
     for layer in layers {
         let name = layer.name();
         match layer {
@@ -156,8 +156,4 @@ pub fn develop(film: &Film, layers: &[Layer]) -> Image {
 
 fn vec3(v: [f64; 3]) -> Vec3 {
     Vec3::from_array(v.map(|x| x as f32))
-}
-
-fn sum(a: [f64; 3], b: [f64; 3]) -> Vec3 {
-    vec3(std::array::from_fn(|i| a[i] + b[i]))
 }

@@ -2,8 +2,10 @@
 
 use std::time::Duration;
 
+use serde::{Deserialize, Serialize};
+
 /// Rays traced, by purpose.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RayCounts {
     /// Camera rays and their highly directional chains.
     pub view: u64,
@@ -40,7 +42,7 @@ impl std::ops::AddAssign for RayCounts {
 }
 
 /// Time spent in the two passes. A round of view rays with its shadow rays is HIRES, the rounds after it are LORES.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PassTimes {
     /// In HIRES.
     pub hires: Duration,
@@ -66,6 +68,31 @@ impl PassTimes {
         let mut times = self.scaled_to(total.saturating_sub(filled));
         times.lores += filled;
         times
+    }
+}
+
+/// What some work has cost.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Tally {
+    /// Rays traced.
+    pub rays: RayCounts,
+    /// Time that threads spent.
+    pub times: PassTimes,
+}
+
+impl std::ops::AddAssign for Tally {
+    fn add_assign(&mut self, o: Self) {
+        self.rays += o.rays;
+        self.times += o.times;
+    }
+}
+
+impl std::iter::Sum for Tally {
+    fn sum<I: Iterator<Item = Self>>(all: I) -> Self {
+        all.fold(Tally::default(), |mut sum, one| {
+            sum += one;
+            sum
+        })
     }
 }
 

@@ -140,6 +140,16 @@ impl Environment {
         self.size
     }
 
+    /// Radiance at the middle of each texel before the map is turned, row by row from the zenith.
+    pub(super) fn texels(&self) -> &[Vec3] {
+        &self.texels
+    }
+
+    /// Angle by which the map is turned, radians.
+    pub(super) fn rotation(&self) -> f32 {
+        self.rotation
+    }
+
     /// The sun, where there is one.
     pub fn sun(&self) -> Option<&SunDisk> {
         self.sun.as_ref()

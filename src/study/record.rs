@@ -1,5 +1,6 @@
 //! What a run gave, kept on disk: a study that was stopped goes on where it was.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -9,6 +10,7 @@ use super::error::Errors;
 use super::plan::Role;
 use crate::clock::Spent;
 use crate::error::{Error, Result};
+use crate::unfinished;
 
 /// The result of one run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -157,15 +159,7 @@ pub fn make_folder(folder: &Path) -> Result<()> {
 /// # Errors
 /// When the system refuses.
 pub fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    // Temporary files are private by default; this one becomes a report that others may read.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file = builder.tempfile_in(folder).map_err(|e| cannot_write(path, &e))?;
-    std::io::Write::write_all(&mut file, bytes).map_err(|e| cannot_write(path, &e))?;
-    file.persist(path).map_err(|e| cannot_write(path, &e.error))?;
-    Ok(())
+    unfinished::write(path, |file| file.write_all(bytes))
 }
 
 fn cannot_write(path: &Path, reason: &dyn std::fmt::Display) -> Error {

@@ -11,6 +11,7 @@ mod record;
 
 use glam::Vec3;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::integrator::{Captured, FarField, World};
 use super::path::{Arrival, Path};
@@ -47,46 +48,101 @@ const TOLERANCE: f32 = 0.2;
 /// Least reach in pixels.
 const LEAST_PIXELS: f32 = 3.0;
 
+/// Places at which light is gathered between two looks at what there is.
+const CHUNK: usize = 4096;
+
 /// Keeps the cache's random numbers apart from the image's.
 const STREAM: u32 = 0x6361_6368;
 
 /// Records of indirect light.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(from = "Unindexed")]
 pub struct IrradianceCache {
+    /// Those of the passes that are done.
     records: Vec<Record>,
+    /// Passes of [`PASSES`] that are done.
+    passes: usize,
+    /// Those of the first `next` places of the pass after them.
+    fresh: Vec<Record>,
+    next: usize,
+    #[serde(skip)]
     index: Index,
 }
 
+/// A cache in a file: the index follows from the rest.
+#[derive(Deserialize)]
+struct Unindexed {
+    records: Vec<Record>,
+    passes: usize,
+    fresh: Vec<Record>,
+    next: usize,
+}
+
+impl From<Unindexed> for IrradianceCache {
+    fn from(Unindexed { records, passes, fresh, next }: Unindexed) -> Self {
+        IrradianceCache { index: Index::new(&records), records, passes, fresh, next }
+    }
+}
+
 impl IrradianceCache {
-    /// Fills a cache for one view. The same on any number of threads, unless `over` says that it must end.
-    pub fn new(
+    /// Whether all passes are done.
+    pub fn is_full(&self) -> bool {
+        self.passes == PASSES.len()
+    }
+
+    /// Whether there is anything in it.
+    pub fn is_begun(&self) -> bool {
+        self.passes > 0 || self.next > 0
+    }
+
+    /// Goes on filling the cache for a view until it is full. The same on any number of threads. `each` looks at what there is from
+    /// time to time. Ends with false, and with what there is, where `over` says so.
+    pub fn fill(
+        &mut self,
         world: &World<'_>,
         camera: &Camera,
         size: [u32; 2],
         seed: u32,
         over: &(dyn Fn() -> bool + Sync),
-    ) -> Self {
-        let Some(far) = &world.far else { return IrradianceCache::default() };
+        each: &mut dyn FnMut(&Self),
+    ) -> bool {
+        let Some(far) = &world.far else {
+            self.passes = PASSES.len();
+            return true;
+        };
         let view = ViewRays::new(camera, size, hash_all(&[seed, STREAM]));
-        let mut cache = IrradianceCache::default();
-        for (pass, (spacing, strata)) in PASSES.into_iter().enumerate() {
-            let places = cache.places(world, &view, size, spacing, pass as u32);
-            let fresh: Vec<Option<Record>> = places
-                .par_iter()
-                .enumerate()
-                .map_init(Workspace::default, |ws, (number, place)| {
-                    let stream = hash_all(&[seed, STREAM, pass as u32, number as u32]);
-                    if over() { None } else { gather(world, far, ws, place, strata, stream) }
-                })
-                .collect();
-            cache.records.extend(fresh.into_iter().flatten());
-            cache.settle(far.r_thresh);
-            log::debug!("irradiance cache: {} places at every {spacing} pixels, {} records", places.len(), cache.len());
+        while let Some(&(spacing, strata)) = PASSES.get(self.passes) {
+            let pass = self.passes as u32;
+            let places = self.places(world, &view, size, spacing, pass);
+            while self.next < places.len() {
+                let chunk = self.next..(self.next + CHUNK).min(places.len());
+                let gathered: Vec<Option<Record>> = chunk
+                    .clone()
+                    .into_par_iter()
+                    .map_init(Workspace::default, |ws, number| {
+                        let stream = hash_all(&[seed, STREAM, pass, number as u32]);
+                        if over() { None } else { gather(world, far, ws, &places[number], strata, stream) }
+                    })
+                    .collect();
+                if over() {
+                    return false;
+                }
+                self.fresh.extend(gathered.into_iter().flatten());
+                self.next = chunk.end;
+                each(self);
+            }
+            self.records.append(&mut self.fresh);
+            self.next = 0;
+            self.settle(far.r_thresh);
+            self.passes += 1;
+            log::debug!("irradiance cache: {} places at every {spacing} pixels, {} records", places.len(), self.len());
+            if self.is_full() {
+                self.check();
+                let refuse = self.records.iter().filter(|r| r.refuses).count();
+                log::debug!("irradiance cache: {refuse} of {} records refuse", self.len());
+            }
         }
-        cache.check();
-        let refuse = cache.records.iter().filter(|r| r.refuses).count();
-        log::debug!("irradiance cache: {refuse} of {} records refuse", cache.len());
-        cache
+        true
     }
 
     /// Diffuse places at the pixels of a grid that the records so far do not cover.

@@ -3,6 +3,7 @@
 use std::f32::consts::{FRAC_1_PI, TAU};
 
 use glam::{Mat3, Vec3};
+use serde::{Deserialize, Serialize};
 
 use crate::sampling::{basis, sobol};
 
@@ -42,7 +43,7 @@ const MOST_CHANGE: f32 = 0.5;
 const IN_FRONT: f32 = 0.1;
 
 /// Indirect light at one point of a surface, and how it changes around it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(super) struct Record {
     pub position: Vec3,
     /// Unit shading normal on the lit side.
@@ -147,14 +148,15 @@ impl Record {
     /// Weight of the record at a point: one at its own, falling linearly to zero at the end of its reach (Tabellion and
     /// Lamorlette 2004).
     pub fn weight(&self, position: Vec3, normal: Vec3) -> f32 {
+        // Squares as far as that decides: most records that are asked do not reach the point
         let offset = position - self.position;
-        let near = offset.length() / self.reach;
-        let turned = ((1.0 - normal.dot(self.normal)).max(0.0) / (1.0 - LEAST_COSINE)).sqrt();
-        let weight = 1.0 - near.max(turned);
-        if weight <= 0.0 || offset.dot(normal + self.normal) < -2.0 * IN_FRONT * self.reach {
+        let (d2, r2) = (offset.length_squared(), self.reach * self.reach);
+        let cos = normal.dot(self.normal);
+        if d2 >= r2 || cos <= LEAST_COSINE || offset.dot(normal + self.normal) < -2.0 * IN_FRONT * self.reach {
             return 0.0;
         }
-        weight
+        let turned = (1.0 - cos).max(0.0) / (1.0 - LEAST_COSINE);
+        1.0 - (d2 / r2).max(turned).sqrt()
     }
 
     /// Irradiance over pi at a nearby point, by the gradients.
