@@ -96,10 +96,10 @@ impl<'a> Run<'a> {
 
     /// Shoots with `rays` rays for the light that is unshot at the start, until the share of unshot flux is below `limit`.
     ///
-    /// Later shots get rays in proportion to their share in all that has been shot by then. The relative variance of a sum of shots of
-    /// flux f is at most the sum of f^2 / n over its square, so that with n = N f / S it stays below 1 / N however often light is
-    /// reflected, while the number of rays grows only with the logarithm of that: where it is reflected a thousand times, 8 N and
-    /// not 1000 N.
+    /// Of light that is reflected often, later shots are ever smaller parts of all that has been shot, and get fewer rays: of flux f, after S
+    /// has been shot, n = N f / sqrt(f0 S), with N the rays and f0 the flux at the start. The relative variance of the sum, the sum of
+    /// f^2 / n over its square, is then at most 4/3 of that of as many rays in equal density, while their number grows only with the
+    /// root of the number of reflections: where there are a thousand, 63 N and not 1000 N.
     ///
     /// # Errors
     /// [`Error::Unsolvable`] when the light does not decrease.
@@ -122,7 +122,7 @@ impl<'a> Run<'a> {
             }
             bar.set_position((total_steps * (share.min(1.0).ln() / limit.ln()).clamp(0.0, 1.0)) as u64);
             self.check_solvable(&ledger)?;
-            shot += self.step(rays as f64 / initial.max(shot));
+            shot += self.step(rays as f64 / (initial * initial.max(shot)).sqrt());
         }
         bar.finish_and_clear();
         Ok(())

@@ -44,7 +44,7 @@ fn rad_002_high_reflectance() {
         let room = closed_box([1.0; 3], [rho; 6], [1.0; 6]);
         let params = RadiosityParams { unshot: 1e-3, error: 1e-3, ..one_patch() };
         let solution = room.solve(&params).unwrap();
-        // Rays grow with the logarithm of the number of reflections.
+        // Rays grow with the root of the number of reflections.
         assert!(solution.rays < 100_000_000, "{} rays", solution.rays);
         for face in 0..6 {
             // Five standard errors. The f32 reflectance is not the decimal one; at 0.999 that changes the result by 1e-5.
