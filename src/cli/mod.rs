@@ -1,6 +1,7 @@
 //! The command line: a thin face over the library.
 
 pub mod compare;
+pub mod frames;
 pub mod info;
 pub mod long;
 pub mod manual;

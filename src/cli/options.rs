@@ -10,7 +10,7 @@ use crate::clock::Stopwatch;
 use crate::error::{Error, Result};
 use crate::pipeline::{BackendKind, GeometryKind, Method, Settings, Stats};
 use crate::progress::Progress;
-use crate::scene::{self, Scene};
+use crate::scene::{self, LoadOptions, Scene};
 use crate::simplify::BoxFit;
 
 /// A length or `auto`.
@@ -59,6 +59,9 @@ pub struct MethodOptions {
     /// Edge length of radiosity patches (scene units)
     #[arg(long, value_name = "LENGTH|auto", default_value = "auto", help_heading = "Method")]
     pub patch_size: LengthOrAuto,
+    /// Fewest patches that a surface is cut into, about, however small it is; the paper's surfaces have 7 on average
+    #[arg(long, value_name = "N", default_value_t = Settings::default().least_patches, help_heading = "Method")]
+    pub least_patches: u32,
     /// How boxes are fitted to clusters
     #[arg(long = "box", value_enum, default_value_t, help_heading = "Method")]
     pub box_fit: BoxFit,
@@ -74,6 +77,9 @@ pub struct MethodOptions {
     /// Threads [default: all]
     #[arg(long, value_name = "N", help_heading = "Run")]
     pub threads: Option<usize>,
+    /// Folder that keeps the simplified scene and the radiosity solution for later runs
+    #[arg(long, value_name = "DIR", help_heading = "Run")]
+    pub cache: Option<PathBuf>,
     /// Ray-tracing library
     #[arg(long, value_enum, default_value_t, help_heading = "Run")]
     pub backend: BackendKind,
@@ -122,10 +128,12 @@ impl MethodOptions {
             beta: self.beta.unwrap_or(default.beta),
             box_fit: self.box_fit,
             patch_size: self.patch_size.0,
+            least_patches: self.least_patches,
             unshot: self.unshot,
             filter_glossy: self.filter_glossy,
             max_depth: self.max_depth.unwrap_or(default.max_depth),
             backend: self.backend,
+            cache: self.cache.clone(),
             threads: self.threads.unwrap_or(0),
             seed: self.seed,
             ..default
@@ -153,8 +161,16 @@ pub fn set_threads(threads: Option<usize>) -> Result<()> {
 /// # Errors
 /// As [`scene::gltf::load`].
 pub fn load(options: &SceneOptions, stats: &mut Stats) -> Result<Arc<Scene>> {
+    load_with(options, &LoadOptions::default(), stats)
+}
+
+/// The same, with a choice of what to read.
+///
+/// # Errors
+/// As [`scene::gltf::load`].
+pub fn load_with(options: &SceneOptions, what: &LoadOptions, stats: &mut Stats) -> Result<Arc<Scene>> {
     let start = Stopwatch::start();
-    let scene = scene::gltf::load(&options.scene, &scene::gltf::LoadOptions::default())?;
+    let scene = scene::gltf::load(&options.scene, what)?;
     stats.record_time(start, |s| &mut s.load);
     for warning in &scene.notes.warnings {
         log::warn!("{}: {warning}", scene.name);

@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use clap::Args;
 
+use super::frames::{self, FrameOptions};
 use super::long::{Checkpoint, LongOptions};
 use super::options::{MethodOptions, SceneOptions, Talk, load, set_threads};
 use super::output::{OutputOptions, names};
@@ -15,7 +16,7 @@ use crate::clock::Stopwatch;
 use crate::error::{Error, Result};
 use crate::image::Metadata;
 use crate::pipeline::identity::identity;
-use crate::pipeline::{Method, Prepared, Stats, choose_camera};
+use crate::pipeline::{Method, Prepared, Stats, choose_camera_among};
 use crate::progress::Progress;
 use crate::render::layers::{Layer, develop};
 use crate::render::{Region, RenderParams, Rendering, Session, World, bias};
@@ -51,7 +52,7 @@ impl FromStr for PartOf {
 #[derive(Args, Debug)]
 pub struct Options {
     #[command(flatten)]
-    scene: SceneOptions,
+    pub(super) scene: SceneOptions,
     #[command(flatten)]
     output: OutputOptions,
     /// Width in pixels [default: 1280, or from the height and the camera]
@@ -94,9 +95,11 @@ pub struct Options {
     #[arg(long, value_name = "N", default_value_t = BIAS_SAMPLES, help_heading = "Quality")]
     measure_bias: u32,
     #[command(flatten)]
-    outside: OutsideOptions,
+    pub(super) frames: FrameOptions,
     #[command(flatten)]
-    method: MethodOptions,
+    pub(super) outside: OutsideOptions,
+    #[command(flatten)]
+    pub(super) method: MethodOptions,
     /// Layers to write beside R,G,B where the format has named channels: hires, lores, hires_dev, lores_dev, albedo, normal,
     /// depth, trials, class, cluster, lookup_distance, near_share [default: all]
     #[arg(long, value_name = "NAME,...", value_delimiter = ',', help_heading = "Output")]
@@ -107,7 +110,7 @@ pub struct Options {
     #[command(flatten)]
     long: LongOptions,
     #[command(flatten)]
-    talk: Talk,
+    pub(super) talk: Talk,
 }
 
 /// Runs the command.
@@ -122,10 +125,13 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     let progress = options.talk.progress();
     stop_on_ctrl_c(&progress);
 
+    if let Some(range) = options.frames.range() {
+        return frames::run(options, range, &progress);
+    }
     let mut stats = Stats::new();
     let mut scene = load(&options.scene, &mut stats)?;
     options.outside.surround(&mut scene)?;
-    let views = options.views(&scene)?;
+    let views = options.views(&scene.name, &scene.cameras)?;
     let params = views.iter().map(|view| options.render_params(&view.camera)).collect::<Result<Vec<_>>>()?;
     let cameras: Vec<Camera> = views.iter().map(|view| view.camera.clone()).collect();
     // Before the preparation, which may take long: a checkpoint of something else is noticed at once.
@@ -149,11 +155,13 @@ pub fn run(options: &Options) -> Result<ExitCode> {
 }
 
 /// A camera and where its image goes.
-struct View {
-    camera: Camera,
-    outputs: Vec<PathBuf>,
-    stats: Option<PathBuf>,
-    checkpoint: Option<PathBuf>,
+pub(super) struct View {
+    pub camera: Camera,
+    pub outputs: Vec<PathBuf>,
+    pub stats: Option<PathBuf>,
+    pub checkpoint: Option<PathBuf>,
+    /// Number in a sequence; `None` for a single image.
+    pub frame: Option<u32>,
 }
 
 /// The path with a camera's name before its extension.
@@ -164,26 +172,32 @@ fn of_camera(path: &Path, name: &str) -> PathBuf {
 }
 
 impl Options {
+    /// Whether indirect light is interpolated between places.
+    pub(super) fn interpolates(&self) -> bool {
+        !self.per_pixel
+    }
+
     fn layers(&self) -> &[Layer] {
         self.layers.as_deref().unwrap_or(&Layer::ALL)
     }
 
-    /// The cameras that are asked for. With several, their names are in those of the files.
-    fn views(&self, scene: &Scene) -> Result<Vec<View>> {
+    /// The cameras that are asked for, of those that a scene has. With several, their names are in those of the files.
+    pub(super) fn views(&self, scene: &str, cameras: &[Camera]) -> Result<Vec<View>> {
         if self.scene.camera.as_deref() != Some(ALL_CAMERAS) {
-            let camera = choose_camera(scene, self.scene.camera.as_deref())?.clone();
+            let camera = choose_camera_among(scene, cameras, self.scene.camera.as_deref())?.clone();
             let checkpoint = self.long.checkpoint().map(Path::to_owned);
             return Ok(vec![View {
                 camera,
                 outputs: self.output.output.clone(),
                 stats: self.stats.clone(),
                 checkpoint,
+                frame: None,
             }]);
         }
         let harmless = |c: char| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' };
         let mut names: Vec<String> = Vec::new();
         let mut views = Vec::new();
-        for (number, camera) in scene.cameras.iter().enumerate() {
+        for (number, camera) in cameras.iter().enumerate() {
             let mut name: String = camera.name.chars().map(harmless).collect();
             if name.is_empty() || names.contains(&name) {
                 name = format!("{name}{number}");
@@ -192,14 +206,14 @@ impl Options {
             OutputOptions::check(&outputs)?;
             let stats = self.stats.as_ref().map(|path| of_camera(path, &name));
             let checkpoint = self.long.checkpoint().map(|path| of_camera(path, &name));
-            views.push(View { camera: camera.clone(), outputs, stats, checkpoint });
+            views.push(View { camera: camera.clone(), outputs, stats, checkpoint, frame: None });
             names.push(name);
         }
         Ok(views)
     }
 
     /// Where the rendering of a view is kept while it is not finished; `cameras` are those that the scene is prepared for.
-    fn keep(
+    pub(super) fn keep(
         &self,
         scene: &Scene,
         cameras: &[Camera],
@@ -210,9 +224,10 @@ impl Options {
         self.long.keep(&view.outputs[0], view.checkpoint.as_deref(), identity)
     }
 
-    /// Renders and writes one view. False when it was stopped before the first trial.
+    /// Renders and writes one view. False when it was stopped too early for that: before the first trial, or in the midst of a
+    /// sequence, where what is written counts as finished.
     #[expect(clippy::too_many_arguments, reason = "all that a run has")]
-    fn render_view(
+    pub(super) fn render_view(
         &self,
         prepared: &Prepared,
         view: &View,
@@ -232,8 +247,13 @@ impl Options {
         };
         stats.record_rendering(&rendering);
         let advice = kept.map_or_else(String::new, Checkpoint::advice);
-        if rendering.film.pixels().all(|p| p.hires.trials() == 0) {
-            self.talk.say(format!("gsii: stopped before the first trial; no image was written{advice}"));
+        let when = match view.frame {
+            Some(frame) if progress.stopped() => Some(format!("in frame {frame}")),
+            _ if rendering.film.pixels().all(|p| p.hires.trials() == 0) => Some("before the first trial".to_owned()),
+            _ => None,
+        };
+        if let Some(when) = when {
+            self.talk.say(format!("gsii: stopped {when}; no image was written{advice}"));
             return Ok(false);
         }
         self.measure_bias(prepared, camera, params, &rendering, stats);
@@ -263,7 +283,7 @@ impl Options {
         self.output.write(&view.outputs, &developed, &metadata(stats))
     }
 
-    fn render_params(&self, camera: &Camera) -> Result<RenderParams> {
+    pub(super) fn render_params(&self, camera: &Camera) -> Result<RenderParams> {
         let aspect = camera.aspect.unwrap_or(16.0 / 9.0);
         let (width, height) = match (self.width, self.height) {
             (Some(w), Some(h)) => (w, h),
@@ -299,6 +319,7 @@ impl Options {
             features: self.layers().iter().any(|l| l.is_feature()),
             interpolate: !self.per_pixel,
             seed: self.method.seed,
+            frame: None,
         })
     }
 
@@ -335,7 +356,8 @@ impl Options {
             return;
         }
         let start = Stopwatch::start();
-        let world = World { cache: rendering.cache.as_deref(), ..prepared.world() };
+        let world = prepared.world();
+        let world = World { cache: rendering.cache.as_deref().or(world.cache), ..world };
         let bias = bias::measure(&world, camera, params, self.measure_bias);
         stats.record_bias(&bias, &rendering.film);
         stats.record_time(start, |s| &mut s.bias);
@@ -366,6 +388,7 @@ impl Options {
         if let Some(Region { low: [x0, y0], high: [x1, y1] }) = params.region {
             map.insert("region".to_owned(), format!("{x0} {y0} {x1} {y1}").into());
         }
+        self.frames.record(params.frame, map);
         self.outside.record(map)
     }
 

@@ -43,9 +43,15 @@ pub struct Options {
     /// Edge length of radiosity patches (scene units)
     #[arg(long, value_name = "LENGTH|auto", default_value = "auto", help_heading = "Method")]
     patch_size: LengthOrAuto,
+    /// Fewest patches that a surface is cut into, about, however small it is; the paper's surfaces have 7 on average
+    #[arg(long, value_name = "N", default_value_t = Settings::default().least_patches, help_heading = "Method")]
+    least_patches: u32,
     /// Seed: the same seed gives the same result, bit for bit
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Run")]
     seed: u32,
+    /// Folder that keeps the result for later runs
+    #[arg(long, value_name = "DIR", help_heading = "Run")]
+    cache: Option<PathBuf>,
     /// Ray-tracing library
     #[arg(long, value_enum, default_value_t, help_heading = "Run")]
     backend: BackendKind,
@@ -63,7 +69,9 @@ impl Options {
             box_fit: self.box_fit,
             longest_cluster: self.longest_cluster,
             patch_size: self.patch_size.0,
+            least_patches: self.least_patches,
             backend: self.backend,
+            cache: self.cache.clone(),
             seed: self.seed,
             ..default
         }

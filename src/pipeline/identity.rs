@@ -34,6 +34,7 @@ pub fn identity(
         features,
         interpolate,
         seed: _,
+        frame,
     } = params;
     // Those of the settings that are not among its parameters.
     let Settings { crease_angle, longest_cluster, face_resolution, direct, focus, radiosity_rays, .. } = settings;
@@ -46,6 +47,9 @@ pub fn identity(
     add("camera", format!("{camera:?}"));
     if cameras.len() > 1 {
         add("set of cameras", format!("{cameras:?}"));
+    }
+    if let Some(frame) = frame {
+        add("frame", frame.to_string());
     }
     add("width", width.to_string());
     add("height", height.to_string());
@@ -65,7 +69,7 @@ pub fn identity(
 }
 
 /// Version, and the program file's own hash: another build may round differently.
-fn program() -> String {
+pub(super) fn program() -> String {
     let build = std::env::current_exe().and_then(std::fs::read).map(|bytes| xxh3_64(&bytes));
     match build {
         Ok(hash) => format!("gsii {}, build {hash:016x}", env!("CARGO_PKG_VERSION")),

@@ -1,6 +1,8 @@
 //! From a scene to everything the renderer needs, and the record of what was done.
 
 pub mod auto;
+pub mod cache;
+mod far;
 pub mod identity;
 pub mod settings;
 pub mod stats;
@@ -8,6 +10,8 @@ pub mod validate;
 
 use std::sync::Arc;
 
+pub use cache::Cache;
+pub use far::Far;
 pub use settings::{BackendKind, GeometryKind, Method, Settings};
 pub use stats::Stats;
 
@@ -18,11 +22,12 @@ use crate::clock::Stopwatch;
 use crate::error::{Error, Result};
 use crate::lighting::Lights;
 use crate::progress::Progress;
-use crate::radiosity::{self, RadiosityParams, RadiosityScene, Solution};
-use crate::render::{self, FarField, Nearness, RenderParams, Rendering, Round, Session, Watcher, World};
+use crate::radiosity::RadiosityParams;
+use crate::render::{self, FarField, IrradianceCache, RenderParams, Rendering, Round, Session, Watcher, World};
 use crate::scene::{Camera, Scene};
 use crate::shading::Lobes;
-use crate::simplify::{self, Simplified, SimplifiedGeometry, SimplifyParams, TriangleSource};
+use crate::simplify::{self, Simplified, SimplifyParams};
+use far::Kept;
 
 /// A scene, prepared for one method: acceleration structures, simplified scene, radiosity solution.
 pub struct Prepared {
@@ -36,22 +41,9 @@ pub struct Prepared {
     pub far: Option<Far>,
     /// Settings with every automatic choice filled in.
     pub settings: Settings,
-}
-
-/// The far field's parts; see [`FarField`].
-pub struct Far {
-    /// How the simplification came about; `None` where the geometry is complete (PMM).
-    pub simplified: Option<Simplified>,
-    /// The triangles that radiosity was solved on.
-    pub geometry: SimplifiedGeometry,
-    /// The same, for rays.
-    pub rays: Box<dyn RayScene>,
-    /// Radiosities.
-    pub solution: Solution,
-    /// See [`FarField::plain`].
-    pub plain: Vec<bool>,
-    /// Where near parts of gather rays need the detailed scene.
-    pub nearness: Option<Nearness>,
+    /// Indirect light that all images are interpolated from; see [`Prepared::share_between`].
+    flight: Option<IrradianceCache>,
+    kept: Kept,
 }
 
 impl Prepared {
@@ -91,14 +83,16 @@ impl Prepared {
         stats.counts.triangles = scene.mesh.triangles.len() as u64;
 
         auto::fill_in(&mut settings, &scene, detailed.as_ref(), cameras);
+        let mut kept = Kept::open(&settings, &scene, backend.as_ref())?;
         let far = match settings.method {
             Method::Mcpt => None,
             // Gather rays change to the far field at half of r_thresh or later: here none is as long.
             Method::Gsii if 0.5 * settings.r_thresh() > scene.mesh.bounds.size().length() => None,
-            _ => Some(Far::new(&scene, &lights, backend.as_ref(), &settings, progress, stats)?),
+            _ => Some(Far::new(&scene, &lights, backend.as_ref(), &settings, &mut kept, progress, stats)?),
         };
         stats.parameters = settings.parameters();
-        Ok(Prepared { scene, lights, detailed, far, settings })
+        stats.cache = kept.used();
+        Ok(Prepared { scene, lights, detailed, far, settings, flight: None, kept })
     }
 
     /// What the renderer works with.
@@ -121,13 +115,40 @@ impl Prepared {
                 // Path tracing is the reference: nothing is blurred there.
                 least_roughness: if self.far.is_some() { self.settings.filter_glossy } else { 0.0 },
             },
-            cache: None,
+            cache: self.flight.as_ref(),
             max_depth: self.settings.max_depth,
         }
     }
 }
 
 impl Prepared {
+    /// Fills one irradiance cache for many views, each a camera with the size of its image in pixels: what is interpolated is then
+    /// the same in all images of the scene. Does nothing where nothing is interpolated.
+    ///
+    /// # Errors
+    /// None but those of the cache folder.
+    pub fn share_between(
+        &mut self,
+        views: &[(Camera, [u32; 2])],
+        progress: &Progress,
+        stats: &mut Stats,
+    ) -> Result<()> {
+        if self.settings.method == Method::Radiosity || !self.world().has_two_fields() {
+            return Ok(());
+        }
+        let start = Stopwatch::start();
+        let stage = progress.stage("irradiance cache", 0);
+        let mut kept = std::mem::take(&mut self.kept);
+        let settings = Settings { cache: None, threads: 0, ..self.settings.clone() };
+        let fill = || IrradianceCache::for_views(&self.world(), views, settings.seed, &|| progress.stopped());
+        let flight = kept.flight(&format!("{settings:?} {views:?}"), progress, fill)?;
+        stats.cache = kept.used();
+        (self.kept, self.flight) = (kept, Some(flight));
+        stage.finish_and_clear();
+        stats.record_time(start, |s| &mut s.flight);
+        Ok(())
+    }
+
     /// Renders with the method that this was prepared for.
     pub fn render(&self, camera: &Camera, params: &RenderParams, progress: &Progress) -> Rendering {
         self.resume(camera, params, Session::new(params), progress, None)
@@ -168,58 +189,6 @@ impl Prepared {
     }
 }
 
-impl Far {
-    fn new(
-        scene: &Arc<Scene>,
-        lights: &Lights,
-        backend: &dyn RayBackend,
-        settings: &Settings,
-        progress: &Progress,
-        stats: &mut Stats,
-    ) -> Result<Far> {
-        let start = Stopwatch::start();
-        let simplified = simplify::simplify(scene, backend, &settings.simplify_params(), progress)?;
-        stats.record_simplified(&simplified);
-        let complete = settings.complete_geometry();
-        let geometry = if complete {
-            SimplifiedGeometry::complete(scene, &simplified.surface_of_triangle)
-        } else {
-            simplified.geometry.clone()
-        };
-        stats.record_time(start, |s| &mut s.simplify);
-
-        let start = Stopwatch::start();
-        let rays = geometry.build(scene, backend)?;
-        let nearness = (!complete).then(|| {
-            let reach = 1.5 * settings.r_thresh();
-            let clusters = simplified.clusters.iter().map(|c| c.bounds.union(c.equivalent_box.bounds()));
-            let dropped = simplified.surfaces.iter().filter(|s| s.class.is_isolated()).map(|s| s.bounds);
-            Nearness::new(scene.mesh.bounds, clusters.chain(dropped), reach)
-        });
-        stats.record_time(start, |s| &mut s.build);
-
-        let start = Stopwatch::start();
-        let clusters: &[_] = if complete { &[] } else { &simplified.clusters };
-        let input = RadiosityScene { scene, lights, geometry: &geometry, clusters, rays: rays.as_ref() };
-        let solution = radiosity::solve(&input, &settings.radiosity_params(), progress)?;
-        stats.record_time(start, |s| &mut s.radiosity);
-        stats.record_solution(&solution);
-        let plain = geometry.sources.iter().map(|source| is_plain(scene, source)).collect();
-        Ok(Far { simplified: (!complete).then_some(simplified), geometry, rays, solution, plain, nearness })
-    }
-}
-
-/// Whether all that leaves a triangle of the far field's geometry is in the radiosity solution.
-fn is_plain(scene: &Scene, source: &TriangleSource) -> bool {
-    match *source {
-        TriangleSource::BoxFace { .. } => true,
-        TriangleSource::Scene { triangle } => {
-            let material = scene.material(triangle);
-            !material.is_emitter() && !material.may_be_sharp()
-        }
-    }
-}
-
 /// Simplifies a scene and does nothing else; gives the settings with every automatic choice filled in.
 ///
 /// # Errors
@@ -234,22 +203,24 @@ pub fn simplify_only(
     settings.check()?;
     let backend = settings.backend.create(settings.threads)?;
     if settings.r_thresh.is_none() || settings.patch_size.is_none() {
-        settings = automatic(scene, camera, settings)?;
+        settings = automatic(scene, std::slice::from_ref(camera), settings)?;
     }
-    let simplified = simplify::simplify(scene, backend.as_ref(), &settings.simplify_params(), progress)?;
+    let mut kept = Kept::open(&settings, scene, backend.as_ref())?;
+    let simplified = kept.simplify(scene, backend.as_ref(), &settings.simplify_params(), progress)?;
+    stats.cache = kept.used();
     stats.record_simplified(&simplified);
     Ok((simplified, settings))
 }
 
-/// Settings with every automatic choice filled in; nothing else is done.
+/// Settings with every automatic choice filled in, so that they suit all `cameras`; nothing else is done.
 ///
 /// # Errors
 /// Usage errors in the settings, backend failures.
-pub fn automatic(scene: &Arc<Scene>, camera: &Camera, mut settings: Settings) -> Result<Settings> {
+pub fn automatic(scene: &Arc<Scene>, cameras: &[Camera], mut settings: Settings) -> Result<Settings> {
     settings.check()?;
     let backend = settings.backend.create(settings.threads)?;
     let detailed = build_detailed(scene, backend.as_ref())?;
-    auto::fill_in(&mut settings, scene, detailed.as_ref(), std::slice::from_ref(camera));
+    auto::fill_in(&mut settings, scene, detailed.as_ref(), cameras);
     Ok(settings)
 }
 
@@ -275,19 +246,27 @@ impl BackendKind {
     }
 }
 
-/// The camera that a name or a number means.
+/// The camera that a name or a number means; the first one without either.
 ///
 /// # Errors
 /// When the scene has no such camera; the message lists those it has.
 pub fn choose_camera<'a>(scene: &'a Scene, wanted: Option<&str>) -> Result<&'a Camera> {
+    choose_camera_among(&scene.name, &scene.cameras, wanted)
+}
+
+/// The same of `cameras` that are not, or not yet, those of a scene called `scene`.
+///
+/// # Errors
+/// As [`choose_camera`].
+pub fn choose_camera_among<'a>(scene: &str, cameras: &'a [Camera], wanted: Option<&str>) -> Result<&'a Camera> {
     let Some(wanted) = wanted else {
-        return scene.cameras.first().ok_or_else(|| Error::Usage(format!("{} has no camera", scene.name)));
+        return cameras.first().ok_or_else(|| Error::Usage(format!("{scene} has no camera")));
     };
-    let by_name = scene.cameras.iter().find(|c| c.name == wanted);
-    let by_number = || wanted.parse::<usize>().ok().and_then(|i| scene.cameras.get(i));
+    let by_name = cameras.iter().find(|c| c.name == wanted);
+    let by_number = || wanted.parse::<usize>().ok().and_then(|i| cameras.get(i));
     by_name.or_else(by_number).ok_or_else(|| {
-        let names: Vec<String> = scene.cameras.iter().enumerate().map(|(i, c)| format!("{i} ({})", c.name)).collect();
-        Error::Usage(format!("{} has no camera '{wanted}'; it has {}", scene.name, names.join(", ")))
+        let names: Vec<String> = cameras.iter().enumerate().map(|(i, c)| format!("{i} ({})", c.name)).collect();
+        Error::Usage(format!("{scene} has no camera '{wanted}'; it has {}", names.join(", ")))
     })
 }
 
@@ -306,10 +285,11 @@ impl Settings {
         }
     }
 
-    /// Parameters for [`radiosity::solve`].
+    /// Parameters for [`radiosity::solve`](crate::radiosity::solve()).
     pub fn radiosity_params(&self) -> RadiosityParams {
         RadiosityParams {
             patch_size: self.patch_size.unwrap_or(f32::MAX),
+            least_patches: self.least_patches,
             max_rays: self.radiosity_rays,
             focus: self.focus,
             unshot: self.unshot,

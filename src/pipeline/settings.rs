@@ -1,5 +1,7 @@
 //! All that a user can choose, independent of the command line.
 
+use std::path::PathBuf;
+
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
@@ -65,6 +67,8 @@ pub struct Settings {
     pub face_resolution: u32,
     /// Target edge length of patches, scene length units.
     pub patch_size: Option<f32>,
+    /// Fewest patches that a surface is cut into, about, 1 or more.
+    pub least_patches: u32,
     /// Share of emitted flux that may stay unshot.
     pub unshot: f64,
     /// How light sources light the patches.
@@ -84,6 +88,9 @@ pub struct Settings {
     pub max_depth: u32,
     /// Ray-tracing library.
     pub backend: BackendKind,
+    /// Folder that the simplified scene and the radiosity solution are kept in for later runs; see [`Cache`](super::Cache). No result
+    /// depends on it.
+    pub cache: Option<PathBuf>,
     /// Threads for the library's own work; 0 for all.
     pub threads: usize,
     /// Seed of everything random.
@@ -102,6 +109,7 @@ impl Default for Settings {
             longest_cluster: simplify::LONGEST_CLUSTER,
             face_resolution: 2,
             patch_size: None,
+            least_patches: 1,
             unshot: 0.01,
             direct: DirectLight::Gather,
             radiosity_error: 0.15,
@@ -111,6 +119,7 @@ impl Default for Settings {
             filter_glossy: 0.3,
             max_depth: u32::MAX,
             backend: BackendKind::Embree,
+            cache: None,
             threads: 0,
             seed: 0,
         }
@@ -149,6 +158,7 @@ impl Settings {
             }
             s if !(s.unshot > 0.0 && s.unshot <= 1.0) => refuse("--unshot", "must be above 0 and at most 1"),
             s if !(0.0..=1.0).contains(&s.filter_glossy) => refuse("--filter-glossy", "must be between 0 and 1"),
+            s if s.least_patches == 0 => refuse("--least-patches", "must be at least 1"),
             s if s.face_resolution == 0 => refuse("face resolution", "must be at least 1"),
             _ => Ok(()),
         }
@@ -165,6 +175,7 @@ impl Settings {
             ("beta", json!(self.beta)),
             ("box", json!(self.box_fit)),
             ("patch_size", length(self.patch_size)),
+            ("least_patches", json!(self.least_patches)),
             ("unshot", json!(self.unshot)),
             ("radiosity_error", json!(self.radiosity_error)),
             ("glossy_threshold", json!(self.glossy_threshold)),

@@ -3,6 +3,7 @@
 use serde::Serialize;
 use serde_json::{Map, Value};
 
+use super::cache::Fetched;
 use crate::clock::Stopwatch;
 use crate::radiosity::Solution;
 use crate::render::{Film, Rendering, bias::Bias};
@@ -27,12 +28,25 @@ pub struct Stats {
     pub error: Errors,
     /// Everything needed to repeat the run.
     pub parameters: Map<String, Value>,
+    /// Where the preparation came from; `None` without a cache folder.
+    pub cache: Option<CacheUse>,
     /// Energy balance of the radiosity solution, W per band.
     pub ledger: Option<crate::radiosity::Ledger>,
     /// Largest memory use of the process, bytes.
     pub peak_rss_bytes: u64,
     /// What the user should know.
     pub warnings: Vec<String>,
+}
+
+/// Where the preparation came from; `None` for what was not needed.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct CacheUse {
+    /// The simplified scene.
+    pub simplify: Option<Fetched>,
+    /// The radiosity solution.
+    pub radiosity: Option<Fetched>,
+    /// The irradiance cache that frames share.
+    pub flight: Option<Fetched>,
 }
 
 /// Seconds by stage.
@@ -46,6 +60,8 @@ pub struct Seconds {
     pub build: f64,
     /// Radiosity solution.
     pub radiosity: f64,
+    /// Irradiance cache that frames share.
+    pub flight: f64,
     /// HIRES pass.
     pub hires: f64,
     /// LORES pass.
@@ -126,6 +142,11 @@ impl Stats {
         let spent = start.spent();
         *stage(&mut self.seconds) += spent.wall;
         *stage(&mut self.cpu_seconds) += spent.cpu;
+    }
+
+    /// The same facts at no cost: for an image from a preparation that was paid for by an earlier one.
+    pub fn at_no_cost(self) -> Self {
+        Stats { seconds: Seconds::default(), cpu_seconds: Seconds::default(), rays: Rays::default(), ..self }
     }
 
     /// Records what simplification found.

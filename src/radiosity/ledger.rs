@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 /// Where the flux went, W per band, f64. `emitted = absorbed + escaped + unshot` to rounding.
-#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Ledger {
     /// Flux that light sources put into the scene (with [`DirectLight::Gather`](super::DirectLight::Gather): that reached a
     /// patch).

@@ -1,12 +1,13 @@
 //! What [`solve`](super::solve) finds.
 
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
 
 use super::ledger::Ledger;
 use super::patches::PatchMap;
 
 /// Radiosities of both sides of every patch, and the way from a hit to its patch.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Solution {
     pub(super) map: PatchMap,
     pub(super) of_patch: Vec<PatchSolution>,
@@ -29,7 +30,7 @@ pub struct Solution {
 }
 
 /// The solution on one patch; front first.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(super) struct PatchSolution {
     /// Radiosity without emission, W/m^2.
     pub radiosity: [Vec3; 2],
@@ -40,6 +41,14 @@ pub(super) struct PatchSolution {
 }
 
 impl Solution {
+    /// A solution that was in a file; `None` if it cannot be one for a geometry of so many triangles. No rays were traced for it.
+    pub(crate) fn restored(self, triangles: usize) -> Option<Solution> {
+        let whole = self.patches == self.of_patch.len()
+            && self.normals.len() == triangles
+            && self.map.is_whole(triangles, self.patches);
+        whole.then_some(Solution { rays: 0, ..self })
+    }
+
     fn at(&self, triangle: u32, u: f32, v: f32) -> &PatchSolution {
         &self.of_patch[self.map.at(triangle, u, v) as usize]
     }

@@ -307,6 +307,7 @@ mod tests {
             features: true,
             interpolate: true,
             seed: 0,
+            frame: None,
         }
     }
 

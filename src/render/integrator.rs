@@ -107,6 +107,13 @@ pub struct FarField<'a> {
     pub nearness: Option<&'a Nearness>,
 }
 
+impl World<'_> {
+    /// Whether there is a far field beyond a near one, as an irradiance cache needs.
+    pub fn has_two_fields(&self) -> bool {
+        self.far.is_some_and(|far| far.r_thresh > 0.0 && far.r_thresh.is_finite())
+    }
+}
+
 impl FarField<'_> {
     /// Radiance without emission that a ray into `direction` meets at a hit on the far field's geometry, W/(sr m^2).
     pub fn reflected(&self, hit: &Hit, direction: Vec3) -> Vec3 {

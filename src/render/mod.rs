@@ -34,10 +34,14 @@ pub use watch::{Moment, Watcher};
 pub use workspace::Workspace;
 
 use crate::progress::Progress;
+use crate::sampling::hash_all;
 use crate::scene::Camera;
 
 /// Trials of one pixel that are traced as one batch; a tile of these fills the second-level cache.
 pub const BATCH_TRIALS: u32 = 16;
+
+/// Keeps the trials of frames apart.
+const FRAME: u32 = 0x6672_616d;
 
 /// Parameters of [`render`].
 #[derive(Clone, Debug, PartialEq)]
@@ -64,12 +68,19 @@ pub struct RenderParams {
     pub interpolate: bool,
     /// Seed: the same seed gives the same image, bit for bit, for any number of threads.
     pub seed: u32,
+    /// Number in a sequence of frames; `None` for a single image. Frames have independent noise, and the rest in common.
+    pub frame: Option<u32>,
 }
 
 impl RenderParams {
     /// The part of the image that is rendered.
     pub fn region(&self) -> Region {
         self.region.unwrap_or(Region::whole([self.width, self.height]))
+    }
+
+    /// Seed of the trials.
+    fn trial_seed(&self) -> u32 {
+        self.frame.map_or(self.seed, |frame| hash_all(&[self.seed, FRAME, frame]))
     }
 
     /// An empty film of that part.
@@ -181,7 +192,5 @@ pub fn resume(
 /// Whether places are needed that indirect light is interpolated between: where that is wanted, the world brings none, and there is
 /// a far field beyond a near one.
 fn wants_cache(world: &World<'_>, params: &RenderParams) -> bool {
-    params.interpolate
-        && world.cache.is_none()
-        && world.far.is_some_and(|far| far.r_thresh > 0.0 && far.r_thresh.is_finite())
+    params.interpolate && world.cache.is_none() && world.has_two_fields()
 }

@@ -253,6 +253,7 @@ mod tests {
             features: false,
             interpolate: false,
             seed: 0,
+            frame: None,
         }
     }
 

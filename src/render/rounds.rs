@@ -139,7 +139,7 @@ impl Renderer<'_> {
                 }
                 (ws.counts, ws.times) = Default::default();
                 for (passes, pixels) in &slice.pixels {
-                    let (first, trials, seed) = (tile.next, slice.trials, self.params.seed);
+                    let (first, trials, seed) = (tile.next, slice.trials, self.params.trial_seed());
                     let features = self.params.features && passes.hires;
                     let batch = Batch { pixels, first, trials, passes: *passes, features, seed };
                     self.world.render_tile(ws, self.camera, size, batch, &mut tile);

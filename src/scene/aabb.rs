@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 /// An axis-aligned box; empty when `min > max` on any axis.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Aabb {
     /// Smallest coordinates.
     pub min: Vec3,

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use glam::{DAffine3, DMat3, Vec2, Vec3};
+use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3};
 
 use super::finish;
 use super::{Camera, ImportNotes, Material, PunctualLight, Scene, Texture};
@@ -50,6 +50,7 @@ pub struct SceneBuilder {
     pub(super) lights: Vec<(DAffine3, PunctualLight)>,
     pub(super) cameras: Vec<(DAffine3, Camera)>,
     pub(super) notes: ImportNotes,
+    pub(super) centre: Option<DVec3>,
     triangles: u64,
 }
 
@@ -60,6 +61,11 @@ impl SceneBuilder {
     /// An empty scene; `name` appears in messages.
     pub fn new(name: impl Into<String>) -> Self {
         SceneBuilder { name: name.into(), ..SceneBuilder::default() }
+    }
+
+    /// Makes a point of the file the origin, instead of the middle of the bounds.
+    pub fn recentre_on(&mut self, centre: Option<DVec3>) {
+        self.centre = centre;
     }
 
     /// An error about this scene.

@@ -21,8 +21,7 @@ pub(super) fn finish(mut builder: SceneBuilder) -> Result<Scene> {
         texture.check().map_err(|e| builder.error(e))?;
     }
     silence_dark_emitters(&mut builder);
-    let bounds = bounds(&builder);
-    let centre = if bounds.0.cmple(bounds.1).all() { 0.5 * (bounds.0 + bounds.1) } else { DVec3::ZERO };
+    let centre = builder.centre.unwrap_or_else(|| middle(&builder));
     let mut lights = Vec::with_capacity(builder.lights.len());
     for (transform, light) in &builder.lights {
         lights.push(place_light(light, transform, centre).map_err(|e| builder.error(e))?);
@@ -73,12 +72,12 @@ fn world_corners(data: &MeshData, triangle: [u32; 3], transform: &DAffine3) -> O
     corners.iter().all(|p| p.abs().max_element() <= MAX_COORDINATE && p.is_finite()).then_some(corners)
 }
 
-/// Bounds of all usable triangles in file coordinates; minimum over maximum without any.
-fn bounds(builder: &SceneBuilder) -> (DVec3, DVec3) {
+/// Middle of the bounds of all usable triangles in file coordinates; the origin without any.
+fn middle(builder: &SceneBuilder) -> DVec3 {
     let empty = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     let union = |a: (DVec3, DVec3), b: (DVec3, DVec3)| (a.0.min(b.0), a.1.max(b.1));
     // Minimum and maximum do not depend on the order of reduction.
-    builder
+    let bounds = builder
         .instances
         .par_iter()
         .map(|instance| {
@@ -86,7 +85,8 @@ fn bounds(builder: &SceneBuilder) -> (DVec3, DVec3) {
             let corners = data.triangles.iter().filter_map(|&t| world_corners(data, t, &instance.transform));
             corners.flatten().fold(empty, |b, p| (b.0.min(p), b.1.max(p)))
         })
-        .reduce(|| empty, union)
+        .reduce(|| empty, union);
+    if bounds.0.cmple(bounds.1).all() { 0.5 * (bounds.0 + bounds.1) } else { DVec3::ZERO }
 }
 
 /// Orthonormal axes nearest to the columns of a linear map, in their order.
@@ -251,7 +251,11 @@ fn place_light(
     Ok(light)
 }
 
-fn place_camera(camera: &Camera, transform: &DAffine3, centre: DVec3) -> std::result::Result<Camera, String> {
+pub(super) fn place_camera(
+    camera: &Camera,
+    transform: &DAffine3,
+    centre: DVec3,
+) -> std::result::Result<Camera, String> {
     let position = transform.transform_point3(camera.position.as_dvec3()) - centre;
     let column = |c: Vec3| transform.transform_vector3(c.as_dvec3()).normalize_or_zero();
     // The direction of view counts most, then up; a mirrored node does not mirror the image.

@@ -31,7 +31,7 @@ pub use builder::{GeometryId, MeshData, SceneBuilder};
 pub use camera::{Camera, Lens, Projection};
 pub use digest::Digest;
 pub use environment::{Environment, SunDisk};
-pub use gltf::{LoadOptions, load};
+pub use gltf::{LoadOptions, Motion, load};
 pub use light::{LightKind, PunctualLight};
 pub use material::{Alpha, Material, TextureSlot};
 pub use mesh::{Mesh, Object};

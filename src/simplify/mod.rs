@@ -8,6 +8,7 @@ pub mod fit;
 pub mod geometry;
 mod replace;
 pub mod report;
+mod restore;
 mod support;
 pub mod surfaces;
 #[cfg(test)]
@@ -18,6 +19,7 @@ mod tests;
 use std::sync::Arc;
 
 use glam::{Mat3, Vec3};
+use serde::{Deserialize, Serialize};
 
 pub use geometry::{SimplifiedGeometry, TriangleSource};
 use replace::{Replaced, Replacer};
@@ -30,7 +32,7 @@ use crate::progress::Progress;
 use crate::scene::{Aabb, AlphaFilter, Scene};
 
 /// How a cluster's box is fitted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, serde::Serialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum BoxFit {
     /// Conserves intercepted flux, escape albedo a face patch. The default.
@@ -44,7 +46,7 @@ pub enum BoxFit {
 pub const LONGEST_CLUSTER: f32 = 3.0;
 
 /// Parameters of [`simplify`].
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SimplifyParams {
     /// `r_thresh`, scene length units, 0..=infinity.
     pub r_thresh: f32,
@@ -66,7 +68,7 @@ pub struct SimplifyParams {
 
 /// What the paper calls a surface: connected triangles of one material that turn no more than the crease angle between
 /// neighbours.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Surface {
     /// Sum of its triangles' areas, one side.
     pub area: f64,
@@ -81,7 +83,7 @@ pub struct Surface {
 }
 
 /// What becomes of a surface in the simplified scene.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Class {
     /// Large enough (or a light source, mirror or glass, or too few triangles for a box to be simpler): in both scenes.
     Normal,
@@ -100,7 +102,7 @@ impl Class {
 }
 
 /// A group of small surfaces and the box that replaces it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Cluster {
     /// Indices into [`Simplified::surfaces`].
     pub surfaces: Vec<u32>,
@@ -118,7 +120,7 @@ pub struct Cluster {
 ///
 /// Faces are numbered x-, x+, y-, y+, z-, z+ in the box's own axes. Patch `(i, j)` of a face has index `j * n + i`, `i` along
 /// the first and `j` along the second of the other two axes in ascending order.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct EquivalentBox {
     /// Centre, world space.
     pub centre: Vec3,
@@ -143,7 +145,7 @@ impl EquivalentBox {
 }
 
 /// Cluster against box, on rays that were not used to fit it.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FitResidual {
     /// Share of uniform lines through the bounding box that hit the cluster.
     pub hit_share: f32,
@@ -161,7 +163,7 @@ pub struct FitResidual {
 }
 
 /// The outcome of simplification.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Simplified {
     /// What it was made with.
     pub params: SimplifyParams,
@@ -173,7 +175,8 @@ pub struct Simplified {
     pub surface_of_triangle: Vec<u32>,
     /// Clusters.
     pub clusters: Vec<Cluster>,
-    /// Normal and simple surfaces, ready for a backend and for radiosity.
+    /// Normal and simple surfaces, ready for a backend and for radiosity. Not in files: it follows from the rest.
+    #[serde(skip)]
     pub geometry: SimplifiedGeometry,
     /// Rays traced to fit boxes and measure residuals.
     pub rays: u64,

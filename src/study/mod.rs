@@ -132,7 +132,7 @@ pub fn run(options: &Options, progress: &Progress, say: &dyn Fn(&str)) -> Result
     for path in &options.scenes {
         let subject = Subject::load(path, options.camera.as_deref(), options.width)?;
         let gsii = Settings { method: Method::Gsii, ..options.base.clone() };
-        let auto = pipeline::automatic(&subject.scene, &subject.camera, gsii)?.r_thresh();
+        let auto = pipeline::automatic(&subject.scene, std::slice::from_ref(&subject.camera), gsii)?.r_thresh();
         let runs = plan::ladder(&subject, &options.base, auto, extent);
         plans.push((subject, runs));
     }

@@ -13,8 +13,9 @@ use crate::simplify::BoxFit;
 pub const PAPER_R_THRESH: f32 = 0.053;
 /// The paper's beta.
 pub const PAPER_BETA: f32 = 1.0 / TAU;
-/// The paper's numbers of surfaces and patches: normal + simple, normal + complex.
-pub const PAPER_PATCHES: [(usize, usize); 2] = [(105, 1124), (10_948, 74_924)];
+/// Edge length of patches, in units of the largest linear dimension of the room, and fewest patches of a surface with which the
+/// office has about as many patches as the paper's: 74,924 on normal + complex surfaces, 1124 on normal + simple ones.
+pub const PAPER_PATCHES: (f32, u32) = (0.1, 7);
 
 /// What a run is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -42,8 +43,6 @@ pub enum Role {
     PaperPmm,
     /// The radiosity solution on normal + simple surfaces, shown directly; the paper's parameters.
     RadiositySimple,
-    /// The same with as few patches as the paper's: our rules keep more surfaces than the paper's hand did.
-    RadiosityFewPatches,
     /// The same on normal + complex surfaces.
     RadiosityComplex,
     /// One of the paper's timings: its stopping rule, for Tables 2 and 3.
@@ -71,17 +70,6 @@ pub enum Sampling {
     Paper,
 }
 
-/// Number of patches that decides the patch size.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-pub enum Patches {
-    /// As the settings say.
-    Auto,
-    /// As many for each surface as in the paper.
-    PaperShare,
-    /// As many as in the paper.
-    PaperCount,
-}
-
 /// One run.
 #[derive(Clone, Debug)]
 pub struct Run {
@@ -91,8 +79,6 @@ pub struct Run {
     pub label: String,
     /// Its settings.
     pub settings: Settings,
-    /// What decides the patch size.
-    pub patches: Patches,
     /// Its trials.
     pub sampling: Sampling,
     /// Whether indirect light is interpolated between places: as by default, but not where the paper is followed.
@@ -115,14 +101,14 @@ impl Run {
     /// Names what the run is a result of, compared with a reference of so many trials: two runs of the same key give the same result.
     pub fn key(&self, subject: &Subject, reference_trials: u32) -> String {
         let settings = serde_json::Value::Object(self.settings.parameters());
-        let what = (self.role, &self.label, self.patches, self.sampling, self.interpolate, reference_trials);
+        let what = (self.role, &self.label, self.sampling, self.interpolate, reference_trials);
         key(&format!("{} {settings} {what:?}", subject.view()))
     }
 
     /// Names what the scene is prepared for: runs with the same name differ in their trials only.
     pub fn preparation_key(&self, subject: &Subject) -> String {
         let settings = serde_json::Value::Object(self.settings.parameters());
-        key(&format!("{} {settings} {:?}", subject.view(), self.patches))
+        key(&format!("{} {settings}", subject.view()))
     }
 
     /// About what it costs, in trials of one pixel by path tracing: for the estimate of what is left to do.
@@ -156,7 +142,6 @@ pub fn main_methods(base: &Settings, extent: Extent) -> Vec<Run> {
             role,
             label: label.to_owned(),
             settings: Settings { method, ..base.clone() },
-            patches: Patches::Auto,
             sampling: Sampling::Rounds { most: extent.main_trials, rel_mse: ENOUGH },
             interpolate: true,
         })
@@ -167,43 +152,45 @@ pub fn main_methods(base: &Settings, extent: Extent) -> Vec<Run> {
 pub fn ladder(subject: &Subject, base: &Settings, auto: f32, extent: Extent) -> Vec<Run> {
     let paper_r_thresh = PAPER_R_THRESH * subject.length();
     let gsii = Settings { method: Method::Gsii, ..base.clone() };
-    let paper_gsii =
-        Settings { r_thresh: Some(paper_r_thresh), beta: PAPER_BETA, box_fit: BoxFit::Paper1993, ..gsii.clone() };
-    let method = |method| Settings { method, ..base.clone() };
-    let for_radiosity = paper_gsii.clone();
-    let radiosity = |geometry| Settings { method: Method::Radiosity, geometry, ..for_radiosity.clone() };
+    let paper = Settings {
+        r_thresh: Some(paper_r_thresh),
+        beta: PAPER_BETA,
+        box_fit: BoxFit::Paper1993,
+        patch_size: Some(PAPER_PATCHES.0 * subject.length()),
+        least_patches: PAPER_PATCHES.1,
+        ..gsii.clone()
+    };
+    let as_in_paper = |method| Settings { method, ..paper.clone() };
+    let radiosity = |geometry| Settings { geometry, ..as_in_paper(Method::Radiosity) };
 
     let other = Sampling::Rounds { most: extent.other_trials, rel_mse: 0.0 };
     let shown = Sampling::Rounds { most: 16, rel_mse: 0.0 };
     let mut runs = main_methods(base, extent);
-    let mut add = |role, label: &str, settings: Settings, patches, sampling| {
+    let mut add = |role, label: &str, settings: Settings, sampling| {
         let interpolate = ![Role::Gather, Role::PaperGsii, Role::PassGsii].contains(&role);
-        runs.push(Run { role, label: label.to_owned(), settings, patches, sampling, interpolate });
+        runs.push(Run { role, label: label.to_owned(), settings, sampling, interpolate });
     };
     let main = Sampling::Rounds { most: extent.main_trials, rel_mse: ENOUGH };
-    add(Role::Gather, "GSII, no interpolation", gsii.clone(), Patches::Auto, main);
+    add(Role::Gather, "GSII, no interpolation", gsii.clone(), main);
     for factor in [0.5, 2.0, 4.0] {
         let settings = Settings { r_thresh: Some(factor * auto), ..gsii.clone() };
-        add(Role::RThresh, &format!("GSII, r_thresh x {factor}"), settings, Patches::Auto, other);
+        add(Role::RThresh, &format!("GSII, r_thresh x {factor}"), settings, other);
     }
     for (beta, name) in [(0.25 * base.beta, format!("{}", 0.25 * base.beta)), (PAPER_BETA, "1/2\u{3c0}".to_owned())] {
-        add(Role::Beta, &format!("GSII, beta {name}"), Settings { beta, ..gsii.clone() }, Patches::Auto, other);
+        add(Role::Beta, &format!("GSII, beta {name}"), Settings { beta, ..gsii.clone() }, other);
     }
     let boxes = Settings { box_fit: BoxFit::Paper1993, ..gsii.clone() };
-    add(Role::Box, "GSII, paper's boxes", boxes, Patches::Auto, other);
+    add(Role::Box, "GSII, paper's boxes", boxes, other);
     let at_paper = Settings { r_thresh: Some(paper_r_thresh), ..gsii.clone() };
-    add(Role::AtPaperRThresh, "GSII, paper's r_thresh", at_paper, Patches::Auto, other);
+    add(Role::AtPaperRThresh, "GSII, paper's r_thresh", at_paper, other);
     // Runs that differ in their trials only come one after the other: they are prepared once.
-    let share = Patches::PaperShare;
-    add(Role::PaperGsii, "GSII, as in the paper", paper_gsii.clone(), share, other);
-    add(Role::PassGsii, "GSII", paper_gsii, share, Sampling::Paper);
-    add(Role::PaperPmm, "PMM, as in the paper", method(Method::Pmm), share, other);
-    add(Role::PassPmm, "PMM", method(Method::Pmm), share, Sampling::Paper);
-    add(Role::PassMcpt, "MCPT", method(Method::Mcpt), Patches::Auto, Sampling::Paper);
-    add(Role::RadiositySimple, "Radiosity, N+S", radiosity(GeometryKind::Ns), share, shown);
-    let few = radiosity(GeometryKind::Ns);
-    add(Role::RadiosityFewPatches, "Radiosity, N+S, few patches", few, Patches::PaperCount, shown);
-    add(Role::RadiosityComplex, "Radiosity, N+C", radiosity(GeometryKind::Nc), share, shown);
+    add(Role::PaperGsii, "GSII, as in the paper", as_in_paper(Method::Gsii), other);
+    add(Role::PassGsii, "GSII", as_in_paper(Method::Gsii), Sampling::Paper);
+    add(Role::PaperPmm, "PMM, as in the paper", as_in_paper(Method::Pmm), other);
+    add(Role::PassPmm, "PMM", as_in_paper(Method::Pmm), Sampling::Paper);
+    add(Role::PassMcpt, "MCPT", Settings { method: Method::Mcpt, ..base.clone() }, Sampling::Paper);
+    add(Role::RadiositySimple, "Radiosity, N+S", radiosity(GeometryKind::Ns), shown);
+    add(Role::RadiosityComplex, "Radiosity, N+C", radiosity(GeometryKind::Nc), shown);
     runs
 }
 

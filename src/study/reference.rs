@@ -82,6 +82,7 @@ pub fn make(
             features: false,
             interpolate: false,
             seed: hash_all(&[STREAM, reference.trials / PASS]),
+            frame: None,
         };
         let rendering = prepared.render(&subject.camera, &params, progress);
         if rendering.stopped {

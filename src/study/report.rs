@@ -101,7 +101,6 @@ fn section(study: &Study, chapter: &Chapter, output: &Path) -> Result<Section> {
         Role::Pmm,
         Role::PaperPmm,
         Role::RadiositySimple,
-        Role::RadiosityFewPatches,
         Role::RadiosityComplex,
     ];
     for run in shown.iter().filter_map(|role| chapter.records.iter().find(|r| r.role == *role)) {

@@ -3,19 +3,17 @@
 use std::path::Path;
 
 use super::error::{Errors, Picture, compare};
-use super::plan::{PAPER_PATCHES, Patches, Run, Sampling};
+use super::plan::{Run, Sampling};
 use super::record::{Point, Preparation, Record, Store};
 use super::reference::Reference;
 use super::subject::Subject;
 use crate::clock::{Spent, Stopwatch};
 use crate::error::Result;
 use crate::image::{self, Metadata, WriteOptions};
-use crate::pipeline::{Prepared, Settings, Stats, simplify_only};
+use crate::pipeline::{Prepared, Stats};
 use crate::progress::Progress;
-use crate::radiosity;
 use crate::render::film::PixelSum;
 use crate::render::{Film, RayCounts, RenderParams};
-use crate::simplify::{Class, SimplifiedGeometry};
 
 /// Keeps the images apart from the default seed's, which everybody looks at.
 const SEED: u32 = 1993;
@@ -31,10 +29,10 @@ pub struct Kit {
 
 impl Kit {
     fn new(key: String, run: &Run, subject: &Subject, progress: &Progress) -> Result<Kit> {
-        let settings = with_patches(run, subject, progress)?;
         let mut stats = Stats::new();
         let watch = Stopwatch::start();
-        let prepared = Prepared::new(subject.scene.clone(), &subject.camera, settings, progress, &mut stats)?;
+        let prepared =
+            Prepared::new(subject.scene.clone(), &subject.camera, run.settings.clone(), progress, &mut stats)?;
         let all = watch.spent();
         for warning in &stats.warnings {
             log::info!("{}, {}: {warning}", subject.name, run.label);
@@ -129,41 +127,8 @@ fn params(run: &Run, subject: &Subject, min_trials: u32, max_trials: u32, error:
         features: false,
         interpolate: run.interpolate,
         seed: SEED,
+        frame: None,
     }
-}
-
-/// The settings of a run, with the patch size that gives the paper's number of patches where that is wanted.
-fn with_patches(run: &Run, subject: &Subject, progress: &Progress) -> Result<Settings> {
-    let mut settings = run.settings.clone();
-    if run.patches == Patches::Auto {
-        return Ok(settings);
-    }
-    let complete = settings.complete_geometry();
-    let (simplified, filled) =
-        simplify_only(&subject.scene, &subject.camera, settings.clone(), progress, &mut Stats::new())?;
-    let geometry = if complete {
-        SimplifiedGeometry::complete(&subject.scene, &simplified.surface_of_triangle)
-    } else {
-        simplified.geometry
-    };
-    let clusters = if complete { &[][..] } else { &simplified.clusters };
-    let (paper_surfaces, paper_patches) = PAPER_PATCHES[usize::from(complete)];
-    let kept = |s: &crate::simplify::Surface| complete || s.class == Class::Normal;
-    let surfaces = simplified.surfaces.iter().filter(|s| kept(s)).count() + 6 * clusters.len();
-    let target = match run.patches {
-        Patches::PaperShare => (paper_patches as f64 / paper_surfaces as f64 * surfaces as f64) as usize,
-        _ => paper_patches,
-    };
-    let mut radiosity = filled.radiosity_params();
-    let mut bounds = [1e-3 * subject.length(), subject.length()];
-    // Fewer patches for larger sizes: 20 halvings of the range of logarithms.
-    for _ in 0..20 {
-        radiosity.patch_size = (bounds[0] * bounds[1]).sqrt();
-        let larger = radiosity::count_patches(&geometry, clusters, &radiosity)? > target;
-        bounds[usize::from(!larger)] = radiosity.patch_size;
-    }
-    settings.patch_size = Some(radiosity.patch_size);
-    Ok(settings)
 }
 
 fn preparation(prepared: &Prepared, stats: &Stats, all: Spent) -> Preparation {

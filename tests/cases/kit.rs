@@ -349,6 +349,7 @@ pub fn image(prepared: &Prepared, camera: &Camera, size: [u32; 2], trials: u32, 
         time_limit: None,
         features: false,
         seed,
+        frame: None,
     };
     let film = render(&prepared.world(), camera, &params, &Progress::silent()).film;
     assert!(film.tiles.iter().all(|t| t.dropped == 0), "trials that are not finite");

@@ -127,6 +127,7 @@ pub fn fixed(width: u32, height: u32, trials: u32, seed: u32) -> RenderParams {
         time_limit: None,
         features: false,
         seed,
+        frame: None,
     }
 }
 

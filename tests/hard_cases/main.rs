@@ -31,6 +31,7 @@ fn fixed([width, height]: [u32; 2], trials: u32) -> RenderParams {
         time_limit: None,
         features: false,
         seed: 1,
+        frame: None,
     }
 }
 

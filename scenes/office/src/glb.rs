@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, HashMap};
 use std::io::{self, Write};
 
-use glam::{Mat3, Quat, Vec3};
+use glam::{Quat, Vec3};
 use gltf_json as json;
 use json::accessor::{ComponentType, GenericComponentType, Type};
 use json::buffer::{Stride, Target, View};
@@ -11,18 +11,20 @@ use json::extensions::material::{EmissiveStrength, EmissiveStrengthFactor, Specu
 use json::validation::{Checked::Valid, USize64};
 use json::{Index, Root};
 
+use crate::flight::{Flight, Key, looking};
 use crate::paint::Paint;
 use crate::scene::{Camera, Mesh, Primitive, Scene};
 
 /// What the binary chunk holds, one buffer view each, in this order: everything of four bytes first keeps all aligned.
-const VIEWS: [&str; 4] = ["positions", "normals", "indices 32", "indices 16"];
+const VIEWS: [&str; 5] = ["positions", "normals", "indices 32", "keys", "indices 16"];
 
 /// Accessors of equal content, so that meshes that differ in material only share their data.
 #[derive(Default)]
 struct Data<'a> {
     shapes: Vec<&'a Primitive>,
     known: HashMap<Vec<u32>, usize>,
-    lengths: [usize; 4],
+    lengths: [usize; 5],
+    keys: &'a [Key],
     accessors: Vec<json::Accessor>,
     attributes: Vec<Attributes>,
 }
@@ -52,7 +54,7 @@ impl<'a> Data<'a> {
             .then(|| self.accessor(1, vertices, 12 * vertices, ComponentType::F32, Type::Vec3));
         let count = 3 * primitive.triangles.len();
         let indices = if is_small(primitive) {
-            self.accessor(3, count, 2 * count, ComponentType::U16, Type::Scalar)
+            self.accessor(4, count, 2 * count, ComponentType::U16, Type::Scalar)
         } else {
             self.accessor(2, count, 4 * count, ComponentType::U32, Type::Scalar)
         };
@@ -98,6 +100,11 @@ impl<'a> Data<'a> {
         for i in large.iter().flat_map(|p| p.triangles.as_flattened()) {
             out.write_all(&i.to_le_bytes())?;
         }
+        let keys = || self.keys.iter();
+        let floats = keys().map(|k| k.time).chain(keys().flat_map(|k| k.eye.to_array()));
+        for x in floats.chain(keys().flat_map(|k| k.rotation.to_array())) {
+            out.write_all(&x.to_le_bytes())?;
+        }
         for i in small.iter().flat_map(|p| p.triangles.as_flattened()) {
             out.write_all(&(*i as u16).to_le_bytes())?;
         }
@@ -120,6 +127,7 @@ fn content(primitive: &Primitive) -> Vec<u32> {
 pub fn write(scene: &Scene, out: &mut impl Write) -> io::Result<()> {
     let mut data = Data::default();
     let meshes = scene.meshes.iter().map(|mesh| convert_mesh(mesh, &mut data)).collect();
+    let animations = scene.flight.iter().map(|flight| convert_flight(flight, scene, &mut data)).collect();
     let binary = data.lengths.iter().sum::<usize>().next_multiple_of(4);
     let mut offset = 0;
     let mut buffer_views: Vec<View> = Vec::new();
@@ -131,7 +139,11 @@ pub fn write(scene: &Scene, out: &mut impl Write) -> io::Result<()> {
             byte_offset: Some(USize64::from(offset)),
             byte_stride: vertices.then_some(Stride(12)),
             name: Some((*name).into()),
-            target: Some(Valid(if vertices { Target::ArrayBuffer } else { Target::ElementArrayBuffer })),
+            target: (*name != "keys").then_some(Valid(if vertices {
+                Target::ArrayBuffer
+            } else {
+                Target::ElementArrayBuffer
+            })),
             extensions: None,
             extras: Default::default(),
         });
@@ -145,6 +157,7 @@ pub fn write(scene: &Scene, out: &mut impl Write) -> io::Result<()> {
             ..Default::default()
         },
         accessors: std::mem::take(&mut data.accessors),
+        animations,
         buffer_views,
         buffers: vec![json::Buffer {
             byte_length: USize64::from(binary),
@@ -253,6 +266,46 @@ fn convert_material(paint: &Paint) -> json::Material {
     }
 }
 
+/// The last camera moves.
+fn convert_flight<'a>(flight: &'a Flight, scene: &Scene, data: &mut Data<'a>) -> json::Animation {
+    use json::animation::{Channel, Interpolation, Property, Sampler, Target};
+    let (keys, node) = (&flight.keys, scene.nodes.len() + scene.cameras.len() - 1);
+    data.keys = keys;
+    let n = keys.len();
+    let times = data.accessor(3, n, 4 * n, ComponentType::F32, Type::Scalar);
+    let ends = [keys.first(), keys.last()].map(|key| serde_json::json!([key.map_or(0.0, |key| key.time)]));
+    let [min, max] = ends.map(Some);
+    let accessor = &mut data.accessors[times.value()];
+    (accessor.min, accessor.max) = (min, max);
+    let eyes = data.accessor(3, n, 12 * n, ComponentType::F32, Type::Vec3);
+    let rotations = data.accessor(3, n, 16 * n, ComponentType::F32, Type::Vec4);
+    let sampler = |output| Sampler {
+        input: times,
+        interpolation: Valid(Interpolation::Linear),
+        output,
+        extensions: None,
+        extras: Default::default(),
+    };
+    let channel = |sampler, property| Channel {
+        sampler: Index::new(sampler),
+        target: Target {
+            node: Index::new(node as u32),
+            path: Valid(property),
+            extensions: None,
+            extras: Default::default(),
+        },
+        extensions: None,
+        extras: Default::default(),
+    };
+    json::Animation {
+        name: Some(flight.camera.name.into()),
+        channels: vec![channel(0, Property::Translation), channel(1, Property::Rotation)],
+        samplers: vec![sampler(eyes), sampler(rotations)],
+        extensions: None,
+        extras: Default::default(),
+    }
+}
+
 fn convert_camera(camera: &Camera) -> json::Camera {
     json::Camera {
         name: Some(camera.name.into()),
@@ -292,10 +345,7 @@ fn convert_nodes(scene: &Scene) -> Vec<json::Node> {
         });
     }
     for (i, camera) in scene.cameras.iter().enumerate() {
-        // A camera looks along its own -z.
-        let back = (camera.eye - camera.target).normalize();
-        let right = Vec3::Y.cross(back).normalize();
-        let rotation = Quat::from_mat3(&Mat3::from_cols(right, back.cross(right), back)).normalize();
+        let rotation = looking(camera.eye, camera.target);
         nodes.push(json::Node {
             name: Some(camera.name.into()),
             camera: Some(Index::new(i as u32)),

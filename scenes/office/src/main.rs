@@ -7,6 +7,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, ValueEnum};
 
+mod flight;
 mod glb;
 mod level;
 mod office;

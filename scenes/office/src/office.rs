@@ -45,6 +45,7 @@ impl Office {
         let mut office = Office { scene: Scene::default(), detail, seed };
         things::furnish(&mut office);
         office.scene.cameras = cameras();
+        office.scene.fly(0, 1);
         office.scene
     }
 
@@ -85,6 +86,31 @@ impl Office {
             let faces = if bottom { primitives::ALL_FACES } else { primitives::ALL_FACES & !primitives::BOTTOM };
             primitives::block(width, height, depth, faces)
         }
+    }
+
+    /// A board, panel or block with rounded edges ([`primitives::cushion`]), which make it one surface; plain where little
+    /// detail is wanted.
+    pub fn slab(&self, width: f32, height: f32, depth: f32, radius: f32) -> Shape {
+        if self.shows(0.3) {
+            primitives::cushion(width, height, depth, radius, self.steps(4).max(4))
+        } else {
+            primitives::block(width, height, depth, primitives::ALL_FACES)
+        }
+    }
+
+    /// A frame with rounded edges ([`primitives::moulding`]), which make it one surface; with sharp ones where little detail
+    /// is wanted.
+    pub fn moulding(&self, width: f32, height: f32, bar: f32, thickness: f32) -> Shape {
+        if self.shows(0.3) {
+            primitives::moulding(width, height, bar, thickness, 0.3 * thickness.min(bar), self.steps(4).max(4))
+        } else {
+            primitives::frame(width, height, bar, thickness)
+        }
+    }
+
+    /// A door's casing ([`primitives::casing`]) with rounded edges.
+    pub fn casing(&self, width: f32, height: f32, bar: f32, thickness: f32) -> Shape {
+        primitives::casing(width, height, bar, thickness, 0.3 * thickness.min(bar), self.steps(4).max(4))
     }
 
     /// Makes a mesh.

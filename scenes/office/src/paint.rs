@@ -41,7 +41,6 @@ pub const SKY: Paint = source("sky", [1.4, 1.6, 1.9]);
 
 pub const CARPET: Paint = solid("carpet", 0.29, 0.30, 0.33);
 pub const SKIRTING: Paint = solid("skirting", 0.72, 0.70, 0.66);
-pub const GRID: Paint = solid("ceiling grid", 0.80, 0.80, 0.78);
 pub const FIXTURE: Paint = solid("luminaire enamel", 0.85, 0.85, 0.84);
 pub const OAK: Paint = solid("oak", 0.46, 0.29, 0.15);
 pub const BEECH: Paint = solid("beech", 0.60, 0.44, 0.27);
@@ -78,7 +77,6 @@ pub const PAPER_BLUE: Paint = sheet("blue paper", 0.42, 0.58, 0.74);
 pub const PAPER_PINK: Paint = sheet("pink paper", 0.78, 0.46, 0.48);
 pub const CRUMPLED: Paint = solid("crumpled paper", 0.78, 0.77, 0.73);
 pub const PAGES: Paint = solid("pages", 0.70, 0.65, 0.53);
-pub const CARDBOARD: Paint = solid("cardboard", 0.46, 0.33, 0.20);
 pub const BLIND: Paint = sheet("blind", 0.76, 0.74, 0.68);
 pub const PORCELAIN: Paint = solid("porcelain", 0.78, 0.77, 0.74);
 pub const GLAZE: Paint = solid("blue glaze", 0.10, 0.22, 0.45);

@@ -257,6 +257,59 @@ pub fn frame(width: f32, height: f32, bar: f32, thickness: f32) -> Shape {
     shape
 }
 
+/// Section of a moulding against a wall: inset from its outer edge and height over the wall, from the outer edge over the front to
+/// the inner one, edges rounded by `radius` with `steps` segments a quarter.
+fn moulding_section(bar: f32, thickness: f32, radius: f32, steps: usize) -> Vec<(f32, f32)> {
+    let quarter = |step: usize| (FRAC_PI_2 * step as f32 / steps as f32).sin_cos();
+    let outer = (0..=steps).map(quarter).map(|(sin, cos)| (radius * (1.0 - cos), thickness - radius * (1.0 - sin)));
+    let inner =
+        (0..=steps).map(quarter).map(|(sin, cos)| (bar - radius * (1.0 - sin), thickness - radius * (1.0 - cos)));
+    std::iter::once((0.0, 0.0)).chain(outer).chain(inner).chain([(bar, 0.0)]).collect()
+}
+
+/// A [`frame`] whose edges are rounded by `radius` with `steps` segments a quarter: with four or more it is one surface.
+pub fn moulding(width: f32, height: f32, bar: f32, thickness: f32, radius: f32, steps: usize) -> Shape {
+    let section = moulding_section(bar, thickness, radius, steps);
+    let mut shape = Shape::default();
+    shape.net(section.len(), 4, true, |row, corner| {
+        let (sx, sy) = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)][corner];
+        let (inset, z) = section[row];
+        vec3(sx * (width / 2.0 - inset), sy * (height / 2.0 - inset), z)
+    });
+    shape
+}
+
+/// The same around a door, `width` and `height` outside, standing on y = 0: open below.
+pub fn casing(width: f32, height: f32, bar: f32, thickness: f32, radius: f32, steps: usize) -> Shape {
+    let section = moulding_section(bar, thickness, radius, steps);
+    let mut shape = Shape::default();
+    shape.net(section.len(), 4, false, |row, corner| {
+        let (inset, z) = section[row];
+        let side = width / 2.0 - inset;
+        let top = height - inset;
+        let (x, y) = [(side, 0.0), (side, top), (-side, top), (-side, 0.0)][corner];
+        vec3(x, y, z)
+    });
+    shape
+}
+
+/// A path along straight lines whose corners are rounded to arcs of the given radius, `steps` pieces each.
+pub fn rounded_path(points: &[Vec3], radius: f32, steps: usize) -> Vec<Vec3> {
+    let mut path = vec![points[0]];
+    for corner in points.windows(3) {
+        let (before, after) = ((corner[1] - corner[0]).normalize(), (corner[2] - corner[1]).normalize());
+        let turn = before.angle_between(after);
+        let inward = after.reject_from(before).normalize();
+        let start = corner[1] - before * radius * (0.5 * turn).tan();
+        path.extend((0..=steps).map(|step| {
+            let (sin, cos) = (turn * step as f32 / steps as f32).sin_cos();
+            start + radius * (sin * before + (1.0 - cos) * inward)
+        }));
+    }
+    path.push(points[points.len() - 1]);
+    path
+}
+
 /// A ball of crumpled paper: an icosahedron cut `cuts` times whose vertices move in and out by up to `depth`.
 pub fn crumpled(radius: f32, cuts: usize, depth: f32, mut random: impl FnMut() -> f32) -> Shape {
     let g = 0.5 * (1.0 + 5.0_f32.sqrt());

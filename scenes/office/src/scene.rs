@@ -2,6 +2,7 @@
 
 use glam::{Affine3A, Quat, Vec3};
 
+use crate::flight::Flight;
 use crate::paint::Paint;
 use crate::shape::Shape;
 use crate::surfaces::{cross, surfaces, weld};
@@ -119,9 +120,18 @@ pub struct Scene {
     pub nodes: Vec<Node>,
     /// Cameras.
     pub cameras: Vec<Camera>,
+    /// What moves the last of them.
+    pub flight: Option<Flight>,
 }
 
 impl Scene {
+    /// Adds a camera that flies from one camera to another.
+    pub fn fly(&mut self, from: usize, to: usize) {
+        let flight = Flight::between(&self.cameras[from], &self.cameras[to]);
+        self.cameras.push(flight.camera.clone());
+        self.flight = Some(flight);
+    }
+
     /// Index of a material, added when new.
     pub fn material(&mut self, paint: Paint) -> usize {
         self.materials.iter().position(|known| known.name == paint.name).unwrap_or_else(|| {

@@ -31,12 +31,15 @@ pub fn cross(positions: &[Vec3], triangle: [u32; 3]) -> glam::DVec3 {
     (b - a).cross(c - a)
 }
 
-/// Edges as (lower vertex, higher vertex, triangle), sorted, so that triangles of one edge are neighbours.
-pub fn sorted_edges(triangles: &[[u32; 3]]) -> Vec<(u32, u32, u32)> {
-    let mut edges: Vec<(u32, u32, u32)> = Vec::with_capacity(3 * triangles.len());
+/// A triangle's side: its vertices in ascending order, the triangle, and whether it runs from the lower to the higher.
+pub type Edge = ((u32, u32), u32, bool);
+
+/// The sides of all triangles, sorted, so that triangles of one edge are neighbours.
+pub fn sorted_edges(triangles: &[[u32; 3]]) -> Vec<Edge> {
+    let mut edges: Vec<Edge> = Vec::with_capacity(3 * triangles.len());
     for (t, &[a, b, c]) in triangles.iter().enumerate() {
         for (p, q) in [(a, b), (b, c), (c, a)] {
-            edges.push((p.min(q), p.max(q), t as u32));
+            edges.push(((p.min(q), p.max(q)), t as u32, p < q));
         }
     }
     edges.sort_unstable();
@@ -45,18 +48,20 @@ pub fn sorted_edges(triangles: &[[u32; 3]]) -> Vec<(u32, u32, u32)> {
 
 /// The surface of each triangle (numbered from 0 in order of first appearance) and how many there are.
 ///
-/// Two triangles are neighbours where exactly they share an edge; an edge shared by more does not connect.
+/// Two triangles are neighbours where they share an edge and wind alike: a board goes on beneath the side that stands on it.
 /// `positions` must be welded.
 pub fn surfaces(positions: &[Vec3], triangles: &[[u32; 3]]) -> (Vec<u32>, u32) {
     let normals: Vec<_> = triangles.iter().map(|&t| cross(positions, t).normalize_or_zero()).collect();
     let crease = f64::from(CREASE_DEGREES).to_radians().cos();
     let mut parent: Vec<u32> = (0..triangles.len() as u32).collect();
-    for edge in sorted_edges(triangles).chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
-        if let [(_, _, s), (_, _, t)] = *edge
-            && normals[s as usize].dot(normals[t as usize]) >= crease
-        {
-            let (s, t) = (root(&mut parent, s), root(&mut parent, t));
-            parent[s.max(t) as usize] = s.min(t);
+    for edge in sorted_edges(triangles).chunk_by(|a, b| a.0 == b.0) {
+        for (i, &(_, s, upward)) in edge.iter().enumerate() {
+            for &(_, t, other) in &edge[i + 1..] {
+                if upward != other && normals[s as usize].dot(normals[t as usize]) >= crease {
+                    let (s, t) = (root(&mut parent, s), root(&mut parent, t));
+                    parent[s.max(t) as usize] = s.min(t);
+                }
+            }
         }
     }
     let mut count = 0;
@@ -103,9 +108,12 @@ mod tests {
     }
 
     #[test]
-    fn edge_of_three_triangles_does_not_connect() {
-        let p = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::NEG_Y, Vec3::new(0.5, -1.0, 0.1)];
+    fn surface_goes_on_where_another_begins() {
+        let p = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::NEG_Y, Vec3::Z];
         assert_eq!(surfaces(&p, &[[0, 1, 2], [0, 3, 1]]).1, 1);
-        assert_eq!(surfaces(&p, &[[0, 1, 2], [0, 3, 1], [0, 4, 1]]).1, 3);
+        // The third stands on the edge between the others.
+        assert_eq!(surfaces(&p, &[[0, 1, 2], [0, 3, 1], [0, 4, 1]]).1, 2);
+        // Two sheets back to back stay apart.
+        assert_eq!(surfaces(&p, &[[0, 1, 2], [0, 2, 1]]).1, 2);
     }
 }

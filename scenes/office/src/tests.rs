@@ -153,7 +153,7 @@ fn file_is_valid_gltf() {
     root.validate(&root, gltf_json::Path::new, &mut |path, error| errors.push(format!("{}: {error}", path())));
     assert!(errors.is_empty(), "{errors:?}");
     let names: Vec<_> = root.cameras.iter().map(|camera| camera.name.as_deref().unwrap()).collect();
-    assert_eq!(names, ["overview", "desk", "pencils", "plant"]);
+    assert_eq!(names, ["overview", "desk", "pencils", "plant", "flight"]);
     for view in &root.buffer_views {
         assert!(
             view.byte_length.0 > 0 && view.byte_offset.unwrap().0 + view.byte_length.0 <= root.buffers[0].byte_length.0

@@ -1,9 +1,12 @@
-//! Charts: connected triangles of one surface whose normals stay close to their mean, so that a plane grid can cut them.
+//! Charts: connected triangles of one surface whose normals stay close to their mean, so that a plane grid can cut them, with what
+//! beside them is too small to be a patch.
 
 use std::collections::VecDeque;
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
+
+use super::join::join_small;
 
 use crate::simplify::SimplifiedGeometry;
 
@@ -31,21 +34,22 @@ pub(super) struct Frame {
 /// An edge of a triangle with welded end points in ascending order. Sorting brings triangles of one surface that share an
 /// edge together.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Edge {
+pub(super) struct Edge {
     surface: u32,
-    ends: [u32; 2],
-    triangle: u32,
+    pub ends: [u32; 2],
+    pub triangle: u32,
 }
 
 impl Edge {
-    fn joins(&self, other: &Edge) -> bool {
+    pub fn joins(&self, other: &Edge) -> bool {
         self.surface == other.surface && self.ends == other.ends
     }
 }
 
 /// Grows charts over `geometry`: breadth first from the first triangle that has none, over shared edges, while the normal
-/// stays within the angle of cosine `min_cos` of the chart's area-weighted mean so far.
-pub(super) fn grow(geometry: &SimplifiedGeometry, min_cos: f64) -> Charts {
+/// stays within the angle of cosine `min_cos` of the chart's area-weighted mean so far. Charts that are small against patches of edge
+/// length `size` are joined to a neighbour.
+pub(super) fn grow(geometry: &SimplifiedGeometry, min_cos: f64, size: f64) -> Charts {
     let welded = weld(geometry);
     let edges = sorted_edges(geometry, &welded);
     let neighbours = neighbours(&edges, geometry.triangles.len());
@@ -77,7 +81,8 @@ pub(super) fn grow(geometry: &SimplifiedGeometry, min_cos: f64) -> Charts {
         normals.push(sum.try_normalize().unwrap_or(DVec3::Z));
     }
     let frames = frames(geometry, &edges, &of_triangle, &normals);
-    Charts { of_triangle, frames }
+    let largest = join_small(geometry, &edges, &mut of_triangle, frames.len(), size);
+    Charts { of_triangle, frames: largest.into_iter().map(|chart| frames[chart as usize]).collect() }
 }
 
 /// Gives vertices at the same position the same number.

@@ -16,6 +16,8 @@ pub(super) struct Grid {
     scale: DVec2,
     /// Extent along the frame's x, y and normal.
     extent: DVec3,
+    /// Fewest cells.
+    least: u32,
     /// Number of cells along x and y.
     pub cells: [u32; 2],
 }
@@ -24,9 +26,9 @@ pub(super) struct Grid {
 const MAX_CELLS: f64 = 65_535.0;
 
 impl Grid {
-    /// The grid whose cells divide the extent of `triangles` evenly into lengths of at most `size`.
-    pub fn fit(geometry: &SimplifiedGeometry, triangles: &[u32], frame: Frame, size: f64) -> Grid {
-        let mut grid = Grid::bounds(geometry, triangles, frame);
+    /// The grid whose cells divide the extent of `triangles` evenly into lengths of at most `size`, and into `least` cells at least.
+    pub fn fit(geometry: &SimplifiedGeometry, triangles: &[u32], frame: Frame, size: f64, least: u32) -> Grid {
+        let mut grid = Grid { least, ..Grid::bounds(geometry, triangles, frame) };
         grid.divide(size);
         grid
     }
@@ -47,14 +49,31 @@ impl Grid {
                 max = max.max(q);
             }
         }
-        Grid { frame, origin: min.truncate(), scale: DVec2::ZERO, extent: max - min, cells: [1, 1] }
+        Grid { frame, origin: min.truncate(), scale: DVec2::ZERO, extent: max - min, least: 1, cells: [1, 1] }
     }
 
-    /// Divides anew into cells of at most `size`.
+    /// Divides anew into cells of at most `size`, or smaller ones where these would be fewer than the fewest.
     pub fn divide(&mut self, size: f64) {
         // The small reduction keeps rounding from turning five cells into six.
         let count = |extent: f64| (extent / size * (1.0 - 1e-4)).ceil().clamp(1.0, MAX_CELLS) as u32;
         self.set_cells([count(self.extent.x), count(self.extent.y)]);
+        if self.len() < u64::from(self.least) {
+            self.set_cells(self.fewest());
+        }
+    }
+
+    /// The fewest cells, or a few more, as square as their number allows.
+    fn fewest(&self) -> [u32; 2] {
+        let least = f64::from(self.least);
+        let (x, y) = (self.extent.x, self.extent.y);
+        let along_short = (least * x.min(y) / x.max(y).max(f64::MIN_POSITIVE)).sqrt().round().clamp(1.0, least);
+        let along_long = (least / along_short).ceil();
+        if x < y { [along_short as u32, along_long as u32] } else { [along_long as u32, along_short as u32] }
+    }
+
+    /// Whether larger cells would not be fewer.
+    pub fn is_at_least(&self) -> bool {
+        self.len() == 1 || self.cells == self.fewest()
     }
 
     fn set_cells(&mut self, cells: [u32; 2]) {

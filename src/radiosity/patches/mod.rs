@@ -6,15 +6,17 @@
 mod charts;
 mod exposure;
 mod grid;
+mod join;
 mod sampling;
 
 use std::collections::VecDeque;
 
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
-use crate::radiosity::{Focus, RadiosityScene};
+use crate::radiosity::{Focus, RadiosityParams, RadiosityScene};
 use crate::shading::SurfacePoint;
 use crate::simplify::{Cluster, SimplifiedGeometry, TriangleSource};
 use charts::{Charts, Frame};
@@ -29,7 +31,8 @@ const CHART_COS: f64 = 0.866;
 /// The same where charts alone would exceed the bound on patches: cos 60 degrees.
 const COARSE_CHART_COS: f64 = 0.5;
 
-/// A cell with less than this share of the chart's fullest cell is joined to a neighbour: it would catch too few rays.
+/// A cell with less than this share of the chart's fullest cell, and a chart with less than this share of a patch, is joined to a neighbour: it
+/// would catch too few rays.
 const SMALLEST_SHARE: f64 = 0.05;
 
 /// All patches of a geometry. Patch `p` has the sides `2 p` (front) and `2 p + 1` (back).
@@ -55,7 +58,7 @@ pub(super) struct Patches {
 }
 
 /// From points on triangles to patches.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(super) struct PatchMap {
     /// One a triangle.
     maps: Vec<CellMap>,
@@ -75,7 +78,7 @@ pub(super) struct BoxCell {
 }
 
 /// From barycentrics of a triangle to a cell: two affine functions.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct CellMap {
     origin: Vec2,
     du: Vec2,
@@ -111,16 +114,17 @@ fn vector_area(geometry: &SimplifiedGeometry, triangle: [u32; 3]) -> DVec3 {
 }
 
 impl Patches {
-    /// Cuts `geometry` into patches of edge length `size`, or larger where that would give more than about `max_patches`.
+    /// Cuts `geometry` into patches of the size and at least the number for each surface that `params` says, larger where that would give
+    /// more than about `max_patches`.
     ///
     /// # Errors
     /// When there are more grid cells than 32 bits can number.
-    pub fn new(geometry: &SimplifiedGeometry, clusters: &[Cluster], size: f64, max_patches: usize) -> Result<Patches> {
-        let mut charts = charts::grow(geometry, CHART_COS);
-        if charts.frames.len() > max_patches {
-            charts = charts::grow(geometry, COARSE_CHART_COS);
+    pub fn new(geometry: &SimplifiedGeometry, clusters: &[Cluster], params: &RadiosityParams) -> Result<Patches> {
+        let mut charts = charts::grow(geometry, CHART_COS, f64::from(params.patch_size));
+        if charts.frames.len() > params.max_patches {
+            charts = charts::grow(geometry, COARSE_CHART_COS, f64::from(params.patch_size));
         }
-        let (grids, members, size) = grids(geometry, clusters, &charts, size, max_patches);
+        let (grids, members, size) = grids(geometry, clusters, &charts, params);
         let cells: u64 = grids.iter().map(Grid::len).sum();
         if cells >= u64::from(NONE) {
             return Err(Error::Usage(format!("{cells} radiosity cells are too many: choose a larger patch size")));
@@ -217,6 +221,17 @@ impl Patches {
 }
 
 impl PatchMap {
+    /// Whether every point on each of so many triangles leads to one of `patches`.
+    pub fn is_whole(&self, triangles: usize, patches: usize) -> bool {
+        let inside = |map: &CellMap| {
+            let [nx, ny] = map.cells.map(u64::from);
+            nx > 0 && ny > 0 && u64::from(map.first) + nx * ny <= self.cells.len() as u64
+        };
+        self.maps.len() == triangles
+            && self.maps.iter().all(inside)
+            && self.cells.iter().all(|&patch| (patch as usize) < patches)
+    }
+
     /// The patch at barycentrics `u`, `v` of a triangle.
     pub fn at(&self, triangle: u32, u: f32, v: f32) -> u32 {
         let map = &self.maps[triangle as usize];
@@ -253,9 +268,9 @@ fn grids(
     geometry: &SimplifiedGeometry,
     clusters: &[Cluster],
     charts: &Charts,
-    mut size: f64,
-    max_patches: usize,
+    params: &RadiosityParams,
 ) -> (Vec<Grid>, Vec<Vec<u32>>, f64) {
+    let (mut size, max_patches) = (f64::from(params.patch_size), params.max_patches);
     let mut members = vec![Vec::new(); charts.frames.len()];
     for (t, &chart) in charts.of_triangle.iter().enumerate() {
         members[chart as usize].push(t as u32);
@@ -264,21 +279,23 @@ fn grids(
         TriangleSource::BoxFace { cluster, face, .. } => Some((cluster, face)),
         TriangleSource::Scene { .. } => None,
     };
+    let least = least_cells(geometry, &members, params.least_patches);
     let mut grids: Vec<Grid> = members
         .par_iter()
         .zip(&charts.frames)
-        .map(|(triangles, &frame)| match box_face(triangles) {
+        .zip(&least)
+        .map(|((triangles, &frame), &least)| match box_face(triangles) {
             Some((cluster, face)) => {
                 let frame = box_frame(&clusters[cluster as usize], face, frame.normal);
                 Grid::even(geometry, triangles, frame, clusters[cluster as usize].equivalent_box.resolution)
             }
-            None => Grid::fit(geometry, triangles, frame, size),
+            None => Grid::fit(geometry, triangles, frame, size, least),
         })
         .collect();
     loop {
         let total: u64 = grids.iter().map(Grid::len).sum();
-        // What one cell a chart leaves room for; charts do not become fewer with larger cells.
-        let fixed = grids.len() as u64;
+        // What the fewest cells of all charts leave room for; these do not become fewer with larger cells.
+        let fixed = least.iter().copied().map(u64::from).sum::<u64>();
         let room = (max_patches as u64).saturating_sub(fixed).max(max_patches as u64 / 4);
         if total <= fixed + room {
             return (grids, members, size);
@@ -289,10 +306,27 @@ fn grids(
                 grid.divide(size);
             }
         }
-        if grids.iter().zip(&members).all(|(g, m)| g.len() == 1 || box_face(m).is_some()) {
+        if grids.iter().zip(&members).all(|(g, m)| g.is_at_least() || box_face(m).is_some()) {
             return (grids, members, size);
         }
     }
+}
+
+/// Fewest cells of each chart: its share, by area, of the fewest patches of its surface.
+fn least_cells(geometry: &SimplifiedGeometry, members: &[Vec<u32>], least_patches: u32) -> Vec<u32> {
+    let surface = |triangles: &[u32]| geometry.surface_of_triangle[triangles[0] as usize] as usize;
+    let area = |triangles: &Vec<u32>| -> f64 {
+        triangles.iter().map(|&t| vector_area(geometry, geometry.triangles[t as usize]).length()).sum()
+    };
+    let areas: Vec<f64> = members.par_iter().map(area).collect();
+    let mut of_surface = vec![0.0; geometry.surfaces as usize];
+    for (triangles, area) in members.iter().zip(&areas) {
+        of_surface[surface(triangles)] += area;
+    }
+    let share = |(triangles, area): (&Vec<u32>, &f64)| area / of_surface[surface(triangles)].max(f64::MIN_POSITIVE);
+    // A cast from float saturates, and turns no number into 0.
+    let cells = |chart| ((f64::from(least_patches) * share(chart)).round() as u32).max(1);
+    members.iter().zip(&areas).map(cells).collect()
 }
 
 /// In-plane axes of a box face: the other two axes of the box in ascending order, as

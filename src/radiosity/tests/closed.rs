@@ -187,7 +187,7 @@ fn rad_010_concentric_spheres() {
 fn rad_012_and_013_energy_after_every_shot() {
     let room = closed_box([3.0, 2.0, 1.0], [0.5; 6], [0.0, 0.0, 0.0, 0.3, 0.0, 1.0]);
     let input = room.input();
-    let patches = Patches::new(&room.geometry, &[], 0.25, 10_000).unwrap();
+    let patches = Patches::new(&room.geometry, &[], &RadiosityParams::new(0.25)).unwrap();
     let optics = Optics::new(&input, &patches).unwrap();
     let tracer = Tracer { input: &input, patches: &patches, optics: &optics };
     let light = emit::shoot_all(&tracer, 10_000, 7);

@@ -7,7 +7,7 @@ use crate::radiosity::shoot::Shot;
 
 /// Share of the flux that leaves the front of the first surface and arrives on the front and back of the second, with `rays` rays.
 fn form_factor(room: &Room, rays: u32, seed: u32) -> [f64; 2] {
-    let patches = Patches::new(&room.geometry, &[], 1e9, 1000).unwrap();
+    let patches = Patches::new(&room.geometry, &[], &RadiosityParams::new(1e9)).unwrap();
     let optics = Optics::new(&room.input(), &patches).unwrap();
     let tracer = Tracer { input: &room.input(), patches: &patches, optics: &optics };
     let mut incident = vec![DVec3::ZERO; 2 * patches.len()];

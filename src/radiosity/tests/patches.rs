@@ -5,7 +5,7 @@ use glam::{Quat, Vec3};
 use super::*;
 
 fn cut(room: &Room, size: f64) -> Patches {
-    Patches::new(&room.geometry, &[], size, 100_000).unwrap()
+    Patches::new(&room.geometry, &[], &RadiosityParams::new(size as f32)).unwrap()
 }
 
 #[test]
@@ -89,9 +89,47 @@ fn areas_add_up_and_points_lie_on_their_patch() {
 #[test]
 fn number_of_patches_is_bounded() {
     let room = closed_box([1.0; 3], [0.5; 6], [0.0; 6]);
-    let patches = Patches::new(&room.geometry, &[], 1e-4, 1000).unwrap();
+    let params = RadiosityParams { max_patches: 1000, ..RadiosityParams::new(1e-4) };
+    let patches = Patches::new(&room.geometry, &[], &params).unwrap();
     assert!((500..=1000).contains(&patches.len()), "{}", patches.len());
     assert!(patches.size > 1e-4);
+}
+
+#[test]
+fn rounded_edge_is_no_patch_of_its_own() {
+    // A board's top and side, with four strips between them that turn by 22.5 degrees from one to the next.
+    let (top, side, radius) = (0.99, 0.49, 0.004);
+    let mut profile = vec![Vec3::ZERO];
+    profile.extend((0..=4).map(|i| {
+        let (sin, cos) = (0.25 * i as f32 * std::f32::consts::FRAC_PI_2).sin_cos();
+        Vec3::new(top + radius * sin, radius * (cos - 1.0), 0.0)
+    }));
+    profile.push(profile[5] - side * Vec3::Y);
+    let quads = profile.windows(2).flat_map(|p| {
+        let [a, b] = [p[0], p[1]];
+        [[a, a + Vec3::Z, b + Vec3::Z], [a, b + Vec3::Z, b]]
+    });
+    let room = Room::new(vec![(quads.collect(), material(0.5, 0.0))], Vec::new());
+    assert_eq!(room.geometry.surfaces, 1);
+    let patches = cut(&room, 0.25);
+    assert_eq!(patches.len(), 4 * 4 + 2 * 4);
+    let total: f64 = (0..room.geometry.triangles.len() as u32).map(|t| room.scene.mesh.area(t)).sum();
+    assert_close("area", patches.area.iter().sum(), total, 1e-9);
+    // Against large patches all of it is small.
+    assert_eq!(cut(&room, 10.0).len(), 1);
+}
+
+#[test]
+fn each_surface_has_its_fewest_patches() {
+    let room = closed_box([4.0, 3.0, 0.01], [0.5; 6], [0.0; 6]);
+    // Faces of 4 x 3, and strips of 3 and 4 by a hundredth.
+    for (least, faces, strips) in [(1, 1, 1), (2, 2, 2), (7, 8, 7), (12, 12, 12)] {
+        let params = RadiosityParams { least_patches: least, ..RadiosityParams::new(10.0) };
+        assert_eq!(Patches::new(&room.geometry, &[], &params).unwrap().len(), 2 * faces + 4 * strips, "{least}");
+    }
+    // Where patches of the size are more, the size decides.
+    let params = RadiosityParams { least_patches: 7, ..RadiosityParams::new(0.5) };
+    assert_eq!(Patches::new(&room.geometry, &[], &params).unwrap().len(), 2 * (8 * 6) + 2 * 7 + 2 * 8);
 }
 
 /// As many patches as the paper's N+C scene, which its authors could not finish.

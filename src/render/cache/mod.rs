@@ -6,6 +6,7 @@
 //! close together next to other surfaces. Where none reaches, paths gather as without a cache.
 
 mod clamp;
+mod flight;
 mod index;
 mod record;
 

@@ -139,6 +139,14 @@ impl Record {
         })
     }
 
+    /// Whether all numbers in it are possible.
+    pub fn is_sound(&self) -> bool {
+        let vectors = [self.position, self.normal, self.radiance].into_iter();
+        vectors.chain(self.by_rotation).chain(self.by_translation).all(Vec3::is_finite)
+            && [self.distance, self.reach].iter().all(|x| *x > 0.0)
+            && self.reach.is_finite()
+    }
+
     /// Distance over which the light would vanish or double if it went on changing as fast as here.
     pub fn scale_of_change(&self) -> f32 {
         let change: f32 = self.by_translation.iter().map(|g| g.length()).sum();

@@ -24,8 +24,8 @@ const SUPPORTED: &[&str] = &[
 pub(super) struct Document {
     /// The document as the `gltf` crate sees it, without `extras`.
     pub root: Root,
-    /// Local transform of each node, in double precision.
-    pub local: Vec<DAffine3>,
+    /// Where each node stands in its parent, in double precision.
+    pub transforms: Vec<Transform>,
     /// Names of used extensions that are not supported.
     pub ignored: Vec<String>,
 }
@@ -48,12 +48,13 @@ struct Asset {
 }
 
 /// A node's transform in f64: the `gltf` crate rounds to f32, which moves what stands far from the origin.
-#[derive(Deserialize)]
-struct Transform {
-    matrix: Option<[f64; 16]>,
-    translation: Option<[f64; 3]>,
-    rotation: Option<[f64; 4]>,
-    scale: Option<[f64; 3]>,
+#[derive(Clone, Deserialize)]
+pub(super) struct Transform {
+    pub matrix: Option<[f64; 16]>,
+    pub translation: Option<[f64; 3]>,
+    /// Quaternion x, y, z, w of any length.
+    pub rotation: Option<[f64; 4]>,
+    pub scale: Option<[f64; 3]>,
 }
 
 #[derive(Deserialize)]
@@ -83,12 +84,10 @@ impl Document {
         ignored.sort();
         ignored.dedup();
         let transforms: Transforms = typed(&value)?;
-        let local = transforms.nodes.iter().enumerate().map(|(i, t)| t.affine().map_err(|e| format!("node {i}: {e}")));
-        let local = local.collect::<Result<Vec<_>, _>>()?;
         prepare(&mut value);
         let root: Root = typed(&value)?;
         check_indices(&root)?;
-        Ok(Document { root, local, ignored })
+        Ok(Document { root, transforms: transforms.nodes, ignored })
     }
 }
 
@@ -128,6 +127,12 @@ fn prepare(value: &mut Value) {
         }
     }
     strip(value);
+    for animation in value.get_mut("animations").and_then(Value::as_array_mut).into_iter().flatten() {
+        if let Some(channels) = animation.get_mut("channels").and_then(Value::as_array_mut) {
+            // Without a node it is for an extension to say what moves.
+            channels.retain(|channel| channel.pointer("/target").is_none_or(|target| target.get("node").is_some()));
+        }
+    }
     for scene in value.get_mut("scenes").and_then(Value::as_array_mut).into_iter().flatten() {
         if let Value::Object(scene) = scene {
             scene.entry("nodes").or_insert_with(|| Value::Array(Vec::new()));
@@ -175,7 +180,8 @@ fn check_indices(root: &Root) -> Result<(), String> {
 }
 
 impl Transform {
-    fn affine(&self) -> Result<DAffine3, String> {
+    /// As a map.
+    pub(super) fn affine(&self) -> Result<DAffine3, String> {
         if let Some(m) = &self.matrix {
             let m = DMat4::from_cols_array(m);
             let affine = m.row(3).truncate() == DVec3::ZERO && m.w_axis.w == 1.0;

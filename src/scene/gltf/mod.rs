@@ -4,12 +4,16 @@
 //! arithmetic, and nothing is allocated by a number that the file's bytes do not back.
 
 mod accessor;
+mod animation;
 mod buffers;
 mod container;
 mod deform;
 mod instancing;
 mod json;
 mod materials;
+mod motion;
+#[cfg(test)]
+mod moving_tests;
 mod nodes;
 mod primitive;
 mod punctual;
@@ -20,13 +24,15 @@ mod textures;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use glam::DAffine3;
+use glam::{DAffine3, DVec3};
 use gltf::json::Root;
 
+use self::animation::{Pose, Tracks};
 use self::buffers::Buffers;
 use self::container::Container;
 use self::deform::Deformation;
 use self::json::Document;
+pub use self::motion::{Arrangement, Motion};
 use self::nodes::Nodes;
 use self::primitive::Outcome;
 use self::textures::Textures;
@@ -38,6 +44,11 @@ use crate::error::Error;
 pub struct LoadOptions {
     /// Leave out all textures: factors alone count. For tools that need only the geometry.
     pub without_textures: bool,
+    /// Seconds into the file's animations; `None` leaves every node where it is without them.
+    pub seconds: Option<f64>,
+    /// What becomes the origin, in the file's coordinates; `None` is the middle of the bounds. Frames of an animation share one: what
+    /// does not move keeps its bits.
+    pub centre: Option<DVec3>,
 }
 
 /// Reads a `.gltf` or `.glb` file.
@@ -49,10 +60,19 @@ pub fn load(path: &Path, options: &LoadOptions) -> crate::error::Result<Scene> {
     let bytes = std::fs::read(path).map_err(|e| fail(format!("cannot read the file: {e}")))?;
     let container = Container::read(bytes).map_err(fail)?;
     let document = Document::parse(&container.json).map_err(fail)?;
-    let nodes = Nodes::walk(&document).map_err(fail)?;
     let root = &document.root;
     let buffers = Buffers::new(root, path, container.bin.as_deref());
     let mut builder = SceneBuilder::new(path.to_string_lossy());
+    builder.recentre_on(options.centre);
+    let pose = match options.seconds {
+        Some(seconds) => {
+            let (tracks, warnings) = Tracks::read(root, &buffers).map_err(fail)?;
+            warnings.into_iter().for_each(|warning| builder.warn(warning));
+            tracks.pose(&document.transforms, seconds)
+        }
+        None => Pose::still(&document.transforms),
+    };
+    let nodes = Nodes::walk(&document, &pose.transforms).map_err(fail)?;
     for name in &document.ignored {
         builder.warn(format!("the file uses the extension {name}, which is not supported; it is ignored"));
     }
@@ -63,6 +83,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> crate::error::Result<Scene> {
         root,
         buffers: &buffers,
         nodes: &nodes,
+        weights: &pose.weights,
         builder,
         default_material: None,
         geometries: BTreeMap::new(),
@@ -98,6 +119,8 @@ struct Import<'a, 'b> {
     root: &'a Root,
     buffers: &'a Buffers<'b>,
     nodes: &'a Nodes,
+    /// Weights of morph targets that an animation gives to nodes.
+    weights: &'a BTreeMap<usize, Vec<f32>>,
     builder: SceneBuilder,
     /// Number of the material of primitives without one.
     default_material: Option<u32>,
@@ -150,14 +173,15 @@ impl Import<'_, '_> {
         let node = &self.root.nodes[index];
         let mesh = self.root.meshes.get(mesh_index).ok_or_else(|| format!("mesh {mesh_index} does not exist"))?;
         let places = instancing::transforms(self.root, self.buffers, node)?;
-        let weights = node.weights.as_ref().or(mesh.weights.as_ref());
+        let animated = self.weights.get(&index);
+        let weights = animated.or(node.weights.as_ref()).or(mesh.weights.as_ref());
         let mut deformation = Deformation { weights: weights.map_or(&[], Vec::as_slice), joints: None };
         if let Some(skin) = &node.skin {
             deformation.joints = Some(deform::joints(self.root, self.buffers, self.nodes, skin.value())?);
             self.builder.warn("the scene has skinned meshes; they are shown in the pose that the nodes give them");
         }
         // Only what the mesh alone decides can be shared between nodes.
-        let shared = node.weights.is_none() && node.skin.is_none();
+        let shared = animated.is_none() && node.weights.is_none() && node.skin.is_none();
         let world = if node.skin.is_some() { DAffine3::IDENTITY } else { world };
         let base = node.name.as_ref().or(mesh.name.as_ref()).cloned().unwrap_or_else(|| format!("node {index}"));
         for (number, primitive) in mesh.primitives.iter().enumerate() {

@@ -3,7 +3,7 @@
 use glam::DAffine3;
 use gltf::json::Root;
 
-use super::json::Document;
+use super::json::{Document, Transform};
 
 /// World transforms of the nodes that are part of the scene.
 pub(super) struct Nodes {
@@ -16,9 +16,11 @@ pub(super) struct Nodes {
 }
 
 impl Nodes {
-    /// Walks the default scene, else the first one, else all root nodes.
-    pub(super) fn walk(document: &Document) -> Result<Nodes, String> {
+    /// Walks the default scene, else the first one, else all root nodes. `transforms` say where each node stands in its parent.
+    pub(super) fn walk(document: &Document, transforms: &[Transform]) -> Result<Nodes, String> {
         let root = &document.root;
+        let local = transforms.iter().enumerate().map(|(i, t)| t.affine().map_err(|e| format!("node {i}: {e}")));
+        let local = local.collect::<Result<Vec<_>, _>>()?;
         let parents = parents(root)?;
         let mut world = vec![None; root.nodes.len()];
         for start in 0..root.nodes.len() {
@@ -33,7 +35,7 @@ impl Nodes {
             while let Some(node) = chain.pop() {
                 if world[node].is_none() {
                     let above = parents[node].and_then(|p| world[p]).unwrap_or(DAffine3::IDENTITY);
-                    world[node] = Some(above * document.local[node]);
+                    world[node] = Some(above * local[node]);
                 }
             }
         }

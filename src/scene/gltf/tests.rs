@@ -9,12 +9,12 @@ use serde_json::{Value, json};
 use super::*;
 use crate::scene::{Alpha, LightKind, Projection};
 
-fn data_uri(bytes: &[u8]) -> String {
+pub(super) fn data_uri(bytes: &[u8]) -> String {
     format!("data:application/octet-stream;base64,{}", base64::engine::general_purpose::STANDARD.encode(bytes))
 }
 
 /// A triangle (0,0,0) (1,0,0) (0,1,0), its positions twice (the second time with z = 1) and 16 bit indices.
-fn triangle() -> Value {
+pub(super) fn triangle() -> Value {
     let mut bytes = Vec::new();
     for z in [0.0_f32, 1.0] {
         for v in [0.0, 0.0, z, 1.0, 0.0, z, 0.0, 1.0, z] {

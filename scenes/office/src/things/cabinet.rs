@@ -1,11 +1,11 @@
-//! A low cabinet in the back left corner that carries plant and radio, and a filing cabinet beside the bookcases.
+//! A low cabinet in the back left corner that carries plant and radio, and a filing cabinet beside the bookcase.
 
 use glam::vec3;
 
 use super::{plant, radio};
 use crate::office::{GAP, Office};
-use crate::paint::{BEECH, CABINET, DARK_STEEL, PAPER, STEEL, solid};
-use crate::primitives::{ALL_FACES, BOTTOM, Z_LOW, block, cuboid, curve, lathe, tube};
+use crate::paint::{BEECH, CABINET, PAPER, STEEL, solid};
+use crate::primitives::{ALL_FACES, Z_LOW, cuboid, curve, lathe, tube};
 use crate::scene::Pose;
 
 /// Adds both.
@@ -19,11 +19,10 @@ pub fn add(office: &mut Office) {
 fn low(office: &mut Office) {
     let group = Some(office.scene.group(None, "cabinet", Pose::at(0.62, 0.0, 0.245)));
     let (w, h, d) = (1.10, 0.72, 0.42);
-    let body = block(w, h - 0.08 - 0.022, d, ALL_FACES).moved(0.0, 0.08, 0.0);
-    let plinth = block(w - 0.06, 0.08 - GAP, d - 0.06, ALL_FACES & !BOTTOM);
-    let top = office.bevelled(w + 0.02, 0.022 - GAP, d + 0.02, 0.003, true).moved(0.0, h - 0.022 + GAP, 0.0);
-    office.thing(group, "cabinet body", Pose::at(0.0, 0.0, 0.0), [(BEECH, body), (DARK_STEEL, plinth), (BEECH, top)]);
-    let door = office.mesh("cabinet door", [(BEECH, office.bevelled(0.535, 0.60, 0.016, 0.002, true))]);
+    let body = office.slab(w, h - 0.022 - GAP, d, 0.004).moved(0.0, GAP, 0.0);
+    let top = office.slab(w + 0.02, 0.022 - GAP, d + 0.02, 0.006).moved(0.0, h - 0.022 + GAP, 0.0);
+    office.thing(group, "cabinet body", Pose::at(0.0, 0.0, 0.0), [(BEECH, body), (BEECH, top)]);
+    let door = office.mesh("cabinet door", [(BEECH, office.slab(0.535, 0.60, 0.016, 0.004))]);
     let knobs = office.shows(0.005);
     let knob = lathe(&[(0.006, 0.0), (0.005, 0.012), (0.013, 0.018), (0.013, 0.022), (0.0, 0.026)], office.around(16));
     let knob = office
@@ -35,22 +34,22 @@ fn low(office: &mut Office) {
         }
     }
     let top = Some(office.scene.group(group, "on the cabinet", Pose::at(0.0, h + GAP, 0.0)));
-    plant::add(office, top, Pose::at(-0.28, 0.0, 0.01));
+    plant::add(office, top, Pose::at(-0.27, 0.0, 0.01).scaled(glam::Vec3::splat(0.82)));
     if office.shows(0.01) {
         radio::add(office, top, Pose::at(0.25, 0.0, 0.06).yaw(0.22));
     }
 }
 
 fn filing(office: &mut Office) {
-    let group = Some(office.scene.group(None, "filing cabinet", Pose::at(5.52, 0.0, 0.335)));
+    let group = Some(office.scene.group(None, "filing cabinet", Pose::at(4.50, 0.0, 0.335)));
     let (w, h, d) = (0.46, 1.32, 0.62);
     office.thing(
         group,
         "filing cabinet body",
         Pose::at(0.0, 0.0, 0.0),
-        [(CABINET, block(w, h, d, ALL_FACES & !BOTTOM))],
+        [(CABINET, office.slab(w, h - GAP, d, 0.006).moved(0.0, GAP, 0.0))],
     );
-    let front = office.mesh("file drawer", [(CABINET, office.bevelled(0.43, 0.305, 0.018, 0.003, true))]);
+    let front = office.mesh("file drawer", [(CABINET, office.slab(0.43, 0.305, 0.018, 0.005))]);
     let bow = [
         vec3(-0.05, 0.0, 0.0),
         vec3(-0.048, 0.0, 0.024),
@@ -70,10 +69,6 @@ fn filing(office: &mut Office) {
             office.scene.place(group, "file drawer handle", handle, Pose::at(0.0, y + 0.12, d / 2.0 + 0.0187));
             office.scene.place(group, "label", holder, Pose::at(0.0, y + 0.21, d / 2.0 + 0.0187));
         }
-    }
-    if office.shows(0.05) {
-        let top = Some(office.scene.group(group, "on the filing cabinet", Pose::at(0.0, h + GAP, 0.0)));
-        super::books::pile(office, top, "pile on the filing cabinet", Pose::at(-0.04, 0.0, 0.02).yaw(0.15), 6);
     }
 }
 

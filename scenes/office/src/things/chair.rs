@@ -7,7 +7,7 @@ use glam::vec3;
 use super::rug::ON_RUG;
 use crate::office::{GAP, Office};
 use crate::paint::{BLACK, DARK_STEEL, FABRIC, FABRIC_RED, RUBBER, STEEL};
-use crate::primitives::{bar, curve, cushion, cylinder, lathe, loft, rounded_rectangle, tube};
+use crate::primitives::{bar, curve, cushion, cylinder, lathe, loft, rounded_path, rounded_rectangle, tube};
 use crate::scene::Pose;
 
 /// Adds all chairs.
@@ -76,7 +76,7 @@ fn swivel(office: &mut Office, pose: Pose) {
         [(BLACK, hub), (DARK_STEEL, plate), (STEEL, lever), (BLACK, grip)],
     );
     let seat = cushion(0.49, 0.075, 0.47, 0.035, k);
-    let pan = office.bevelled(0.44, 0.012, 0.42, 0.003, true);
+    let pan = office.slab(0.44, 0.012, 0.42, 0.004);
     office.thing(chair, "seat", Pose::at(0.0, 0.4306, 0.01), [(BLACK, pan), (FABRIC, seat.moved(0.0, 0.0123, 0.0))]);
     // The back is a cushion turned upright and bent around the sitter.
     let mut back = cushion(0.45, 0.06, 0.52, 0.028, k);
@@ -111,21 +111,21 @@ fn swivel(office: &mut Office, pose: Pose) {
     }
 }
 
-/// A tubular chair with cushions; one sits looking along +z.
+/// A cantilever chair: cushions on one bent tube; one sits looking along +z.
 fn plain(office: &Office) -> Vec<(crate::paint::Paint, crate::shape::Shape)> {
-    let (n, k, s) = (office.around(14), office.steps(3), office.steps(4));
-    let mut parts = Vec::new();
-    for side in [-1.0, 1.0] {
-        let x = 0.22 * side;
-        let front = [vec3(x, 0.001, 0.21), vec3(x, 0.40, 0.20), vec3(x, 0.43, 0.17), vec3(x, 0.432, -0.19)];
-        let rear = [vec3(x, 0.001, -0.25), vec3(x, 0.40, -0.212), vec3(x, 0.50, -0.215), vec3(x, 0.85, -0.27)];
-        parts.push((STEEL, tube(&curve(&front, s), |_| 0.010, n)));
-        parts.push((STEEL, tube(&curve(&rear, s), |_| 0.010, n)));
-    }
-    parts.push((STEEL, bar(vec3(-0.209, 0.38, 0.19), vec3(0.209, 0.38, 0.19), 0.007, n)));
-    parts.push((STEEL, bar(vec3(-0.208, 0.42, -0.213), vec3(0.208, 0.42, -0.213), 0.007, n)));
-    parts.push((FABRIC_RED, cushion(0.45, 0.045, 0.41, 0.02, k).moved(0.0, 0.4425, 0.01)));
-    let back = cushion(0.42, 0.03, 0.26, 0.013, k).at(Pose::at(0.0, 0.72, -0.245).pitch(FRAC_PI_2 - 0.155).map());
-    parts.push((FABRIC_RED, back));
-    parts
+    let (n, k) = (office.around(14), office.steps(4).max(4));
+    // From the top of the back over seat, front and floor to the middle behind; the other half is its mirror image.
+    let half = [
+        vec3(0.205, 0.80, -0.262),
+        vec3(0.205, 0.425, -0.205),
+        vec3(0.205, 0.425, 0.225),
+        vec3(0.205, 0.0135, 0.205),
+        vec3(0.205, 0.0135, -0.235),
+    ];
+    let mirrored = half.iter().rev().map(|p| vec3(-p.x, p.y, p.z));
+    let points: Vec<_> = half.into_iter().chain(mirrored).collect();
+    let frame = tube(&rounded_path(&points, 0.06, office.steps(5).max(5)), |_| 0.0125, n);
+    let seat = cushion(0.44, 0.05, 0.42, 0.022, k).moved(0.0, 0.4385, 0.005);
+    let back = cushion(0.44, 0.035, 0.28, 0.015, k).at(Pose::at(0.0, 0.69, -0.218).pitch(FRAC_PI_2 - 0.15).map());
+    vec![(STEEL, frame), (FABRIC_RED, seat), (FABRIC_RED, back)]
 }

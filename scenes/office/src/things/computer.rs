@@ -14,13 +14,13 @@ pub fn add(office: &mut Office, parent: Option<usize>, pose: Pose) {
     let computer = Some(office.scene.group(parent, "computer", pose));
     let foot = 0.008;
     let case_height = 0.105;
-    let case = office.bevelled(0.42, case_height, 0.40, 0.004, true).moved(0.0, foot, 0.0);
+    let case = office.slab(0.42, case_height, 0.40, 0.006).moved(0.0, foot, 0.0);
     let mut parts = vec![(PUTTY, case)];
     let fittings = office.shows(0.005);
     for (x, z) in [(-0.18, -0.17), (0.18, -0.17), (-0.18, 0.17), (0.18, 0.17)].into_iter().filter(|_| fittings) {
         parts.push((RUBBER, block(0.03, foot - GAP, 0.03, ALL_FACES & !BOTTOM).moved(x, 0.0, z)));
     }
-    // Two drive bays, a power button and a row of slits, all proud of the front.
+    // Two drive bays, proud of the front.
     for (x, y, w, h) in [(0.11, 0.062, 0.15, 0.03), (0.11, 0.022, 0.11, 0.022)].into_iter().filter(|_| fittings) {
         parts
             .push((PUTTY_DARK, cuboid(vec3(x - w / 2.0, y, 0.2), vec3(x + w / 2.0, y + h, 0.203), ALL_FACES & !Z_LOW)));
@@ -30,11 +30,6 @@ pub fn add(office: &mut Office, parent: Option<usize>, pose: Pose) {
         ));
     }
     office.thing(computer, "computer case", Pose::at(0.0, 0.0, 0.0), parts);
-    let slit = office
-        .mesh("case slit", [(PUTTY_DARK, cuboid(vec3(0.0, 0.0, 0.0), vec3(0.003, 0.055, 0.0015), ALL_FACES & !Z_LOW))]);
-    for i in 0..office.count(14).min(14) {
-        office.scene.place(computer, "case slit", slit, Pose::at(-0.18 + 0.009 * i as f32, 0.033, 0.2));
-    }
     let n = office.around(24);
     let stand = lathe(&[(0.0, 0.0), (0.13, 0.0), (0.13, 0.010), (0.09, 0.028), (0.0, 0.030)], n);
     office.thing(computer, "screen stand", Pose::at(0.0, foot + case_height + GAP, -0.02), [(PUTTY, stand)]);
@@ -49,7 +44,7 @@ fn screen(office: &mut Office, parent: Option<usize>, pose: Pose) {
     let screen = Some(office.scene.group(parent, "screen", pose));
     let (w, h) = (0.37, 0.34);
     let (front, glass) = (0.15, 0.135);
-    let k = office.steps(2);
+    let k = office.steps(4);
     let quarter = std::f32::consts::FRAC_PI_2;
     // Lofted along z: the loops lie in the xz plane and the whole is turned up.
     let ring = |x: f32, y: f32, r: f32, z: f32| rounded_rectangle(x / 2.0, y / 2.0, r, k, z);

@@ -7,18 +7,18 @@ use glam::vec3;
 use super::stationery;
 use crate::office::Office;
 use crate::paint::{BEECH, CORK, PAPER, PAPER_BLUE, PAPER_PINK, PAPER_YELLOW};
-use crate::primitives::{cuboid, frame, sheet};
+use crate::primitives::{cuboid, sheet};
 use crate::scene::Pose;
 
 /// Outer size, metres.
-const SIZE: (f32, f32) = (1.25, 0.72);
+const SIZE: (f32, f32) = (0.85, 0.58);
 
 /// Adds the board on the left wall; its own +z points into the room.
 pub fn add(office: &mut Office) {
     let pose = Pose::at(0.0, 1.72, 2.05).yaw(FRAC_PI_2);
     let board = Some(office.scene.group(None, "cork board", pose));
     let (w, h) = SIZE;
-    let rim = frame(w, h, 0.022, 0.018);
+    let rim = office.moulding(w, h, 0.022, 0.018);
     let cork = cuboid(
         vec3(-w / 2.0 + 0.022, -h / 2.0 + 0.022, 0.0),
         vec3(w / 2.0 - 0.022, h / 2.0 - 0.022, 0.010),
@@ -31,8 +31,8 @@ pub fn add(office: &mut Office) {
     // A tack's own axis points from head to pin: turned so that the pin goes into the board.
     let stuck = |x: f32, y: f32, tilt: f32| Pose::at(x, y, surface + 0.0058).pitch(-FRAC_PI_2 + tilt);
     let steps = office.steps(3);
-    let (columns, rows) = (6, 3);
-    let notes = office.count(16).min(columns * rows);
+    let (columns, rows) = (5, 3);
+    let notes = office.count(15).min(columns * rows);
     for i in 0..notes {
         let cell = (i * 7) % (columns * rows);
         let (cw, ch) = ((w - 0.07) / columns as f32, (h - 0.07) / rows as f32);

@@ -5,7 +5,7 @@ use glam::vec3;
 use super::{computer, keyboard, stationery, telephone};
 use crate::office::{GAP, Office};
 use crate::paint::{BLACK, DARK_STEEL, LAMP_LIGHT, OAK, PAPER, STEEL, WALNUT};
-use crate::primitives::{ALL_FACES, BOTTOM, block, cuboid, curve, cylinder, lathe, tube};
+use crate::primitives::{curve, lathe, rounded_path, tube};
 use crate::scene::Pose;
 
 /// Height of the desk's top, metres.
@@ -31,18 +31,17 @@ pub fn add(office: &mut Office) {
 }
 
 fn furniture(office: &mut Office, parent: Option<usize>) {
-    let top = office.bevelled(1.80, 0.028, 0.80, 0.003, true).moved(0.0, HEIGHT - 0.028, 0.0);
+    let top = office.slab(1.80, 0.028, 0.80, 0.008).moved(0.0, HEIGHT - 0.028, 0.0);
     office.thing(parent, "desk top", Pose::at(0.0, 0.0, 0.0), [(OAK, top)]);
     let under = HEIGHT - 0.028 - GAP;
     let frame = [
         // A plain side, a back board between the sides, and a chest of drawers as the other side.
-        (OAK, block(0.025, under, 0.72, ALL_FACES & !BOTTOM).moved(-0.86, 0.0, 0.0)),
-        (OAK, cuboid(vec3(-0.847, 0.25, -0.33), vec3(0.448, under, -0.312), ALL_FACES)),
-        (OAK, block(0.42, under - 0.05, 0.70, ALL_FACES).moved(0.66, 0.05, 0.0)),
-        (DARK_STEEL, block(0.38, 0.0497, 0.62, ALL_FACES & !BOTTOM).moved(0.66, 0.0, 0.0)),
+        (OAK, office.slab(0.028, under - GAP, 0.72, 0.006).moved(-0.86, GAP, 0.0)),
+        (OAK, office.slab(1.294, under - 0.25, 0.018, 0.004).moved(-0.198, 0.25, -0.321)),
+        (OAK, office.slab(0.42, under - GAP, 0.70, 0.006).moved(0.66, GAP, 0.0)),
     ];
     office.thing(parent, "desk frame", Pose::at(0.0, 0.0, 0.0), frame);
-    let front = office.mesh("drawer front", [(WALNUT, office.bevelled(0.40, 0.185, 0.018, 0.003, true))]);
+    let front = office.mesh("drawer front", [(WALNUT, office.slab(0.40, 0.205, 0.018, 0.005))]);
     let n = office.around(16);
     let steps = office.steps(5);
     let bow = [
@@ -54,15 +53,15 @@ fn furniture(office: &mut Office, parent: Option<usize>) {
     ];
     let handle = office.mesh("drawer handle", [(STEEL, tube(&curve(&bow, steps), |_| 0.004, n))]);
     for i in 0..3 {
-        let y = 0.075 + 0.205 * i as f32;
+        let y = 0.035 + 0.222 * i as f32;
         office.scene.place(parent, "drawer front", front, Pose::at(0.66, y, 0.3595));
         if office.shows(0.05) {
-            office.scene.place(parent, "drawer handle", handle, Pose::at(0.66, y + 0.11, 0.369));
+            office.scene.place(parent, "drawer handle", handle, Pose::at(0.66, y + 0.12, 0.369));
         }
     }
 }
 
-/// A lamp with a jointed arm; its bulb is a disc in the shade.
+/// A lamp with a bent arm; its bulb is a disc in the shade.
 fn lamp(office: &mut Office, parent: Option<usize>, pose: Pose) {
     let n = office.around(20);
     let lamp = office.scene.group(parent, "desk lamp", pose);
@@ -71,15 +70,8 @@ fn lamp(office: &mut Office, parent: Option<usize>, pose: Pose) {
         n,
     );
     let (foot, elbow, head) = (vec3(0.0, 0.045, 0.0), vec3(-0.06, 0.40, -0.02), vec3(0.13, 0.60, 0.20));
-    let arm = |a, b| tube(&[a, b], |_| 0.006, office.around(14));
-    let joint = cylinder(0.014, 0.024, n)
-        .at(Pose::at(elbow.x, elbow.y, elbow.z - 0.012).pitch(std::f32::consts::FRAC_PI_2).map());
-    office.thing(
-        Some(lamp),
-        "lamp stand",
-        Pose::at(0.0, 0.0, 0.0),
-        [(BLACK, base), (STEEL, arm(foot, elbow)), (STEEL, arm(elbow, head)), (BLACK, joint)],
-    );
+    let arm = tube(&rounded_path(&[foot, elbow, head], 0.03, office.steps(4).max(4)), |_| 0.006, office.around(14));
+    office.thing(Some(lamp), "lamp stand", Pose::at(0.0, 0.0, 0.0), [(BLACK, base), (STEEL, arm)]);
     // A thin bell, open below, with an inner and an outer wall.
     let bell = [(0.080, 0.0), (0.082, 0.0), (0.072, 0.05), (0.045, 0.09), (0.022, 0.10), (0.020, 0.13), (0.0, 0.135)];
     let inner = [(0.0, 0.088), (0.042, 0.086), (0.069, 0.049), (0.080, 0.0)];

@@ -1,10 +1,12 @@
 //! The closed shell of the room with its window, and what is fixed to it.
 
+use std::f32::consts::{FRAC_PI_2, PI};
+
 use glam::{Vec3, vec3};
 
 use crate::office::{GAP, Office, ROOM};
-use crate::paint::{BRASS, CARPET, DOOR, GRID, SKIRTING, SKY, WALL, WHITE};
-use crate::primitives::{ALL_FACES, BOTTOM, TOP, X_HIGH, X_LOW, Z_HIGH, Z_LOW, block, cuboid, cylinder, frame};
+use crate::paint::{BRASS, CARPET, DOOR, SKIRTING, SKY, WALL, WHITE};
+use crate::primitives::{ALL_FACES, BOTTOM, TOP, X_HIGH, X_LOW, Z_HIGH, Z_LOW, cuboid, cylinder, lathe};
 use crate::scene::Pose;
 use crate::shape::Shape;
 
@@ -22,9 +24,6 @@ pub fn add(office: &mut Office) {
     if office.shows(0.02) {
         skirting(office, parent);
         door(office, parent);
-    }
-    if office.shows(0.1) {
-        ceiling_grid(office, parent);
     }
 }
 
@@ -52,31 +51,45 @@ fn window(office: &mut Office, parent: Option<usize>) {
     let (w, h) = (x1 - x0, y1 - y0);
     let (cx, cy) = (0.5 * (x0 + x1), 0.5 * (y0 + y1));
     // Behind the frame its open back would be seen from outside only.
-    let outer = frame(w - 0.002, h - 0.002, 0.055, 0.05);
-    let post = cuboid(vec3(-0.03, -h / 2.0 + 0.056, 0.0), vec3(0.03, h / 2.0 - 0.056, 0.045), X_LOW | X_HIGH | Z_HIGH);
+    let outer = office.moulding(w - 0.002, h - 0.002, 0.055, 0.05);
+    let post = office.slab(0.06, h - 0.113, 0.04, 0.006).moved(0.0, 0.0565 - h / 2.0, 0.022);
     office.thing(parent, "window frame", Pose::at(cx, cy, -0.18), [(WHITE, outer), (WHITE, post)]);
-    let sill = cuboid(vec3(-w / 2.0 - 0.05, 0.0, 0.0), vec3(w / 2.0 + 0.05, 0.03, 0.12), ALL_FACES & !Z_LOW);
+    let sill = office.slab(w + 0.10, 0.03, 0.12, 0.008).moved(0.0, 0.0, 0.06 + GAP);
     office.thing(parent, "window sill", Pose::at(cx, y0 - 0.031, 0.0), [(WHITE, sill)]);
     if office.shows(0.05) {
         let n = office.around(16);
         let plate = cuboid(vec3(-0.012, -0.03, 0.0), vec3(0.012, 0.03, 0.006), ALL_FACES & !Z_LOW);
         let lever = cylinder(0.006, 0.11, n).moved(0.0, -0.1, 0.02);
-        office.thing(parent, "window handle", Pose::at(cx, cy, -0.18 + 0.045 + GAP), [(BRASS, plate), (BRASS, lever)]);
+        office.thing(parent, "window handle", Pose::at(cx, cy, -0.18 + 0.042 + GAP), [(BRASS, plate), (BRASS, lever)]);
     }
 }
 
+/// Boards along the walls whose upper edge is rounded.
 fn skirting(office: &mut Office, parent: Option<usize>) {
     let (h, d) = (0.08, 0.014);
-    let mut boards = Shape::default();
-    let board = |length: f32| block(length, h, d, TOP | Z_HIGH);
-    boards.join(board(ROOM.x).moved(ROOM.x / 2.0, 0.0, d / 2.0));
-    boards.join(cuboid(vec3(0.0, 0.0, ROOM.z - d), vec3(ROOM.x, h, ROOM.z), TOP | Z_LOW));
-    boards.join(cuboid(vec3(0.0, 0.0, d), vec3(d, h, ROOM.z - d), TOP | X_HIGH));
-    // The right wall's board stops at the door.
-    for (from, to, end) in [(d, DOOR_AT.0 - 0.07, Z_HIGH), (DOOR_AT.1 + 0.07, ROOM.z - d, Z_LOW)] {
-        boards.join(cuboid(vec3(ROOM.x - d, 0.0, from), vec3(ROOM.x, h, to), TOP | X_LOW | end));
-    }
-    office.thing(parent, "skirting", Pose::at(0.0, 0.0, 0.0), [(SKIRTING, boards)]);
+    let steps = office.steps(4).max(4);
+    // Along +x at the wall z = 0, its front towards +z.
+    let board = |from: f32, to: f32| {
+        let mut rows = vec![(0.0, d)];
+        rows.extend((0..=steps).map(|step| {
+            let (sin, cos) = (FRAC_PI_2 * step as f32 / steps as f32).sin_cos();
+            (h - d * (1.0 - sin), d * cos)
+        }));
+        let mut shape = Shape::default();
+        shape.net(rows.len(), 2, false, |row, end| vec3(if end == 0 { from } else { to }, rows[row].0, rows[row].1));
+        shape
+    };
+    let (x, z) = (ROOM.x, ROOM.z);
+    let along = |pose: Pose, from: f32, to: f32| board(from, to).at(pose.map());
+    let boards = [
+        along(Pose::at(0.0, 0.0, 0.0), 0.0, x),
+        along(Pose::at(x, 0.0, z).yaw(PI), 0.0, x),
+        along(Pose::at(0.0, 0.0, z).yaw(FRAC_PI_2), d, z - d),
+        // The right wall's board stops at the door.
+        along(Pose::at(x, 0.0, 0.0).yaw(-FRAC_PI_2), d, DOOR_AT.0 - 0.066),
+        along(Pose::at(x, 0.0, 0.0).yaw(-FRAC_PI_2), DOOR_AT.1 + 0.066, z - d),
+    ];
+    office.thing(parent, "skirting", Pose::at(0.0, 0.0, 0.0), [(SKIRTING, Shape::of(boards))]);
 }
 
 /// Where the door is in the right wall (z from, to).
@@ -84,54 +97,15 @@ const DOOR_AT: (f32, f32) = (1.6, 2.5);
 
 fn door(office: &mut Office, parent: Option<usize>) {
     let (from, to) = DOOR_AT;
-    let at = |low: Vec3, high: Vec3, faces| cuboid(low, high, faces);
-    let (x, height, bar) = (ROOM.x, 2.04, 0.065);
-    let inward = ALL_FACES & !X_HIGH & !BOTTOM;
-    let jambs = Shape::of([
-        at(vec3(x - 0.03, 0.0, from - bar), vec3(x, height, from), inward & !TOP),
-        at(vec3(x - 0.03, 0.0, to), vec3(x, height, to + bar), inward & !TOP),
-        at(vec3(x - 0.03, height, from - bar), vec3(x, height + bar, to + bar), ALL_FACES & !X_HIGH),
-    ]);
-    let leaf = at(vec3(x - 0.012, 0.006, from + 0.003), vec3(x, height - 0.003, to - 0.003), inward | BOTTOM);
-    let mut panels = Shape::default();
-    for (low, high) in [(0.2, 0.85), (1.05, 1.9)] {
-        panels.join(at(vec3(x - 0.018, low, from + 0.13), vec3(x - 0.012, high, to - 0.13), inward | BOTTOM));
-    }
+    let (x, height, bar) = (ROOM.x - GAP, 2.04, 0.065);
+    let (width, middle) = (to - from, 0.5 * (from + to));
+    let casing = office
+        .casing(width + 2.0 * bar, height + bar, bar, 0.03)
+        .at(Pose::at(ROOM.x, GAP, middle).yaw(-FRAC_PI_2).map());
+    let leaf = office.slab(0.014, height - 0.01, width - 0.006, 0.004).moved(x - 0.007, 0.006, middle);
     let n = office.around(16);
-    let knob = crate::primitives::lathe(
-        &[(0.0, 0.0), (0.012, 0.0), (0.012, 0.035), (0.026, 0.045), (0.026, 0.06), (0.0, 0.066)],
-        n,
-    )
-    .at(Pose::at(x - 0.0125, 1.02, to - 0.07).roll(std::f32::consts::FRAC_PI_2).map());
-    office.thing(
-        parent,
-        "door",
-        Pose::at(0.0, 0.0, 0.0),
-        [(WHITE, jambs), (DOOR, leaf), (DOOR, panels), (BRASS, knob)],
-    );
-}
-
-/// T-bars of a suspended ceiling in a grid of 0.6 m; between the long ones lie short pieces, so nothing overlaps.
-fn ceiling_grid(office: &mut Office, parent: Option<usize>) {
-    let (half, drop) = (0.012, 0.008);
-    let long = office.mesh(
-        "ceiling bar",
-        [(GRID, cuboid(vec3(-half, -drop, 0.0), vec3(half, 0.0, ROOM.z), BOTTOM | X_LOW | X_HIGH))],
-    );
-    let (short_from, short_to) = (half, 0.6 - half);
-    let short = cuboid(vec3(short_from, -drop, -half), vec3(short_to, 0.0, half), BOTTOM | Z_LOW | Z_HIGH);
-    let short = office.mesh("ceiling cross bar", [(GRID, short)]);
-    let wall_piece =
-        |from: f32, to: f32| cuboid(vec3(from, -drop, -half), vec3(to, 0.0, half), BOTTOM | Z_LOW | Z_HIGH);
-    let first = office.mesh("ceiling cross bar, first", [(GRID, wall_piece(0.0, short_to))]);
-    let last = office.mesh("ceiling cross bar, last", [(GRID, wall_piece(short_from, 0.6))]);
-    for i in 1..10 {
-        office.scene.place(parent, "ceiling bar", long, Pose::at(0.6 * i as f32, ROOM.y, 0.0));
-    }
-    for j in 1..7 {
-        for i in 0..10 {
-            let mesh = [first, short, last][usize::from(i > 0) + usize::from(i == 9)];
-            office.scene.place(parent, "ceiling cross bar", mesh, Pose::at(0.6 * i as f32, ROOM.y, 0.6 * j as f32));
-        }
-    }
+    let knob = lathe(&[(0.0, 0.0), (0.012, 0.0), (0.012, 0.035), (0.026, 0.045), (0.026, 0.06), (0.0, 0.066)], n)
+        .at(Pose::at(x - 0.0145, 1.02, to - 0.07).roll(FRAC_PI_2).map());
+    let parts = [(WHITE, casing), (DOOR, leaf), (BRASS, knob)];
+    office.thing(parent, "door", Pose::at(0.0, 0.0, 0.0), parts);
 }

@@ -6,8 +6,9 @@ use glam::vec3;
 
 use crate::office::{GAP, Office};
 use crate::paint::{RUG, RUG_BAND};
-use crate::primitives::{ALL_FACES, BOTTOM, TOP, X_HIGH, X_LOW, cuboid, curve, tube};
+use crate::primitives::{curve, tube};
 use crate::scene::Pose;
+use crate::shape::Shape;
 
 /// Length along x and width along z, metres.
 const SIZE: (f32, f32) = (2.6, 2.3);
@@ -23,22 +24,27 @@ pub fn add(office: &mut Office) {
         return;
     }
     let rug = Some(office.scene.group(None, "rug", Pose::at(3.70, 0.0, 1.95).yaw(0.03)));
-    office.thing(rug, "rug", Pose::at(0.0, 0.0, 0.0), [(RUG, office.bevelled(SIZE.0, HEIGHT, SIZE.1, 0.003, false))]);
+    let field = office.slab(SIZE.0, HEIGHT, SIZE.1, 0.004);
+    office.thing(rug, "rug", Pose::at(0.0, 0.0, 0.0), [(RUG, field.moved(0.0, GAP, 0.0))]);
+    // A woven band: too thin to have sides.
     let band = |inset: f32, width: f32| {
-        let (x, z) = (SIZE.0 / 2.0 - inset, SIZE.1 / 2.0 - inset);
-        let y = (HEIGHT + 0.0002, HEIGHT + 0.001);
-        // The bands along z end at those along x.
-        let (whole, between) = (ALL_FACES & !BOTTOM, TOP | X_LOW | X_HIGH);
-        let side = |x0: f32, x1: f32, z0: f32, z1: f32, faces| cuboid(vec3(x0, y.0, z0), vec3(x1, y.1, z1), faces);
-        [
-            side(-x, x, -z, -z + width, whole),
-            side(-x, x, z - width, z, whole),
-            side(-x, -x + width, -z + width, z - width, between),
-            side(x - width, x, -z + width, z - width, between),
-        ]
+        let corner = |i: usize, inset: f32| {
+            let (sx, sz) = [(-1.0, 1.0), (1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)][i % 4];
+            vec3(sx * (0.5 * SIZE.0 - inset), HEIGHT + 0.001, sz * (0.5 * SIZE.1 - inset))
+        };
+        let mut shape = Shape::default();
+        for i in 0..4 {
+            shape.polygon(&[
+                corner(i, inset),
+                corner(i + 1, inset),
+                corner(i + 1, inset + width),
+                corner(i, inset + width),
+            ]);
+        }
+        shape
     };
-    let bands = band(0.07, 0.05).into_iter().chain(band(0.17, 0.015)).map(|shape| (RUG_BAND, shape));
-    office.thing(rug, "rug bands", Pose::at(0.0, 0.0, 0.0), bands.collect::<Vec<_>>());
+    let bands = [band(0.07, 0.05), band(0.17, 0.015)].map(|shape| (RUG_BAND, shape));
+    office.thing(rug, "rug bands", Pose::at(0.0, 0.0, 0.0), bands);
     fringes(office, rug);
     tufts(office, rug);
 }
@@ -89,7 +95,7 @@ fn tufts(office: &mut Office, parent: Option<usize>) {
     let pitch = tile / side as f32;
     let meshes: Vec<usize> = (0..4)
         .map(|_| {
-            let mut all = crate::shape::Shape::default();
+            let mut all = Shape::default();
             for i in 0..per_tile {
                 let foot = vec3(pitch * ((i % side) as f32 + 0.5), 0.0, pitch * ((i / side) as f32 + 0.5));
                 let lean = vec3(rng.around(0.3 * pitch), 0.0, rng.around(0.3 * pitch));

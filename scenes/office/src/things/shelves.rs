@@ -1,61 +1,45 @@
-//! Two bookcases against the back wall.
-
-use glam::vec3;
+//! A bookcase against the back wall.
 
 use super::books;
 use crate::office::{GAP, Office};
 use crate::paint::BEECH;
-use crate::primitives::{ALL_FACES, BOTTOM, X_HIGH, X_LOW, Z_HIGH, Z_LOW, block, cuboid};
 use crate::scene::Pose;
 
-/// Inner width and depth of a bookcase, metres.
-const INNER: (f32, f32) = (0.96, 0.285);
+/// Inner width and depth of the bookcase, metres.
+const INNER: (f32, f32) = (0.86, 0.285);
 /// Thickness of boards.
 const BOARD: f32 = 0.02;
+/// How far edges are rounded.
+const ROUND: f32 = 0.003;
 /// Height of each compartment's floor above the ground, and of the top.
-const FLOORS: [f32; 7] = [0.08, 0.46, 0.82, 1.16, 1.48, 1.80, 2.10];
+const FLOORS: [f32; 6] = [0.08, 0.46, 0.82, 1.16, 1.48, 1.80];
 
-/// Adds the bookcases with what stands in them.
+/// Adds the bookcase with what stands in it.
 pub fn add(office: &mut Office) {
-    for (case, x) in [3.70, 4.71].into_iter().enumerate() {
-        if case > 0 && !office.shows(0.003) {
+    let group = Some(office.scene.group(None, "bookcase", Pose::at(3.72, 0.0, 0.16)));
+    carcass(office, group);
+    for (level, pair) in FLOORS.windows(2).enumerate() {
+        // A bare office has books on its first shelves only.
+        if !office.shows(0.003 * level as f32) {
             continue;
         }
-        let group = Some(office.scene.group(None, "bookcase", Pose::at(x, 0.0, 0.16)));
-        carcass(office, group);
-        for (level, pair) in FLOORS.windows(2).enumerate() {
-            // A bare office has books on its first shelves only.
-            if !office.shows(0.003 * (6 * case + level) as f32) {
-                continue;
-            }
-            let pose = Pose::at(0.0, pair[0] + BOARD + GAP, 0.0);
-            let shelf = Some(office.scene.group(group, "shelf", pose));
-            let height = pair[1] - pair[0] - BOARD - GAP;
-            books::fill(office, shelf, &format!("books {case} {level}"), INNER.0, height, INNER.1);
-        }
+        let pose = Pose::at(0.0, pair[0] + BOARD + GAP, 0.0);
+        let shelf = Some(office.scene.group(group, "shelf", pose));
+        let height = pair[1] - pair[0] - BOARD - GAP;
+        books::fill(office, shelf, &format!("books {level}"), INNER.0, height, INNER.1);
     }
 }
 
 fn carcass(office: &mut Office, parent: Option<usize>) {
     let (w, d) = INNER;
-    let height = FLOORS[6] + BOARD;
-    let side = |x: f32| block(BOARD, height, d + 0.01, ALL_FACES & !BOTTOM).moved(x, 0.0, 0.0);
+    let height = FLOORS[5] + BOARD;
+    let side = |x: f32| office.slab(BOARD, height, d + 0.01, ROUND).moved(x, 0.0, 0.0);
     let x = 0.5 * (w + BOARD);
-    let back = cuboid(
-        vec3(-0.5 * w, 0.08, -0.5 * d - 0.004),
-        vec3(0.5 * w, height, -0.5 * d),
-        ALL_FACES & !X_LOW & !X_HIGH & !Z_LOW,
-    );
-    let plinth = cuboid(vec3(-0.5 * w, 0.0, 0.5 * d - 0.04), vec3(0.5 * w, 0.08, 0.5 * d - 0.025), Z_LOW | Z_HIGH);
-    office.thing(
-        parent,
-        "bookcase sides",
-        Pose::at(0.0, 0.0, 0.0),
-        [(BEECH, side(-x)), (BEECH, side(x)), (BEECH, back), (BEECH, plinth)],
-    );
-    let board =
-        cuboid(vec3(-0.5 * w, 0.0, -0.5 * d), vec3(0.5 * w, BOARD, 0.5 * d), ALL_FACES & !X_LOW & !X_HIGH & !Z_LOW);
-    let board = office.mesh("shelf board", [(BEECH, board)]);
+    let back = office.slab(w - 2.0 * GAP, height - 0.08, 0.006, 0.001).moved(0.0, 0.08, -0.5 * d - 0.0035);
+    let plinth = office.slab(w - 2.0 * GAP, 0.08 - GAP, 0.015, ROUND).moved(0.0, 0.0, 0.5 * d - 0.03);
+    let parts = [side(-x), side(x), back, plinth].map(|shape| (BEECH, shape));
+    office.thing(parent, "bookcase sides", Pose::at(0.0, 0.0, 0.0), parts);
+    let board = office.mesh("shelf board", [(BEECH, office.slab(w - 2.0 * GAP, BOARD, d, ROUND))]);
     for floor in FLOORS {
         office.scene.place(parent, "shelf board", board, Pose::at(0.0, floor, 0.0));
     }

@@ -5,54 +5,48 @@ use glam::vec3;
 use super::rug::ON_RUG;
 use super::{books, calculator, stationery};
 use crate::office::{GAP, Office};
-use crate::paint::{BEECH, CARDBOARD, DARK_STEEL, PORCELAIN, SKIRTING};
-use crate::primitives::{ALL_FACES, BOTTOM, TOP, X_HIGH, X_LOW, block, cuboid, cylinder};
+use crate::paint::{BEECH, PORCELAIN, SKIRTING};
+use crate::primitives::{ALL_FACES, BOTTOM, TOP, X_HIGH, X_LOW, block, cuboid};
 use crate::scene::Pose;
 use crate::shape::Shape;
 
 /// Height of the table's top, metres.
 const HEIGHT: f32 = 0.73;
 
-/// Adds the table and a cardboard box on the floor.
+/// Adds the table.
 pub fn add(office: &mut Office) {
     if !office.shows(0.02) {
         return;
     }
     let table = Some(office.scene.group(None, "table", Pose::at(3.72, 0.0, 1.92).yaw(0.03)));
-    let n = office.around(18);
-    let top = office.bevelled(1.40, 0.025, 0.78, 0.004, true).moved(0.0, HEIGHT - 0.025, 0.0);
+    let top = office.slab(1.40, 0.03, 0.78, 0.010).moved(0.0, HEIGHT - 0.03, 0.0);
     let mut parts = vec![(BEECH, top)];
-    for (x, z) in [(-0.62, -0.31), (0.62, -0.31), (-0.62, 0.31), (0.62, 0.31)] {
-        parts.push((DARK_STEEL, cylinder(0.022, HEIGHT - 0.025 - ON_RUG - 2.0 * GAP, n).moved(x, ON_RUG + GAP, z)));
-    }
-    for z in [-0.31, 0.31] {
-        parts.push((DARK_STEEL, cuboid(vec3(-0.596, 0.64, z - 0.01), vec3(0.596, 0.70, z + 0.01), ALL_FACES)));
+    let leg = HEIGHT - 0.03 - ON_RUG - 2.0 * GAP;
+    for (x, z) in [(-0.63, -0.32), (0.63, -0.32), (-0.63, 0.32), (0.63, 0.32)] {
+        parts.push((BEECH, office.slab(0.06, leg, 0.06, 0.012).moved(x, ON_RUG + GAP, z)));
     }
     office.thing(table, "table top and legs", Pose::at(0.0, 0.0, 0.0), parts);
     let on = Some(office.scene.group(table, "on the table", Pose::at(0.0, HEIGHT + GAP, 0.0)));
-    books::pile(office, on, "pile on the table", Pose::at(-0.45, 0.0, -0.10).yaw(0.4), office.count(5).min(8));
+    books::pile(office, on, "pile on the table", Pose::at(-0.45, 0.0, -0.14).yaw(0.25), office.count(5).min(8));
     if office.shows(0.05) {
         stationery::paper_stack(
             office,
             on,
             "papers left",
-            Pose::at(-0.08, 0.0, 0.20).yaw(0.25),
+            Pose::at(-0.36, 0.0, 0.19).yaw(0.12),
             office.count(20).min(400),
         );
         stationery::paper_stack(
             office,
             on,
             "papers right",
-            Pose::at(0.48, 0.0, -0.16).yaw(-0.2),
+            Pose::at(0.46, 0.0, -0.08).yaw(-0.12),
             office.count(36).min(400),
         );
         stationery::mug(office, on, Pose::at(0.20, 0.0, 0.0).yaw(2.2), PORCELAIN);
         stationery::tape(office, on, Pose::at(0.10, 0.0, -0.24).yaw(0.7));
-        calculator::add(office, on, Pose::at(0.42, 0.0, 0.20).yaw(0.25));
+        calculator::add(office, on, Pose::at(0.43, 0.0, 0.22).yaw(0.25));
         floppies(office, on, Pose::at(-0.15, 0.0, -0.22).yaw(-0.3));
-    }
-    if office.shows(0.1) {
-        carton(office);
     }
 }
 
@@ -89,30 +83,5 @@ fn floppies(office: &mut Office, parent: Option<usize>, pose: Pose) {
         let z = 0.06 - 0.0055 * i as f32;
         let pose = Pose::at(rng.around(0.003), t + 0.0006, z).pitch(-lean + rng.around(0.008));
         office.scene.place(group, "floppy disk", disks[rng.below(4)], pose);
-    }
-}
-
-/// An open carton with rolled plans.
-fn carton(office: &mut Office) {
-    let group = Some(office.scene.group(None, "carton", Pose::at(5.45, 0.0, 1.08).yaw(0.2)));
-    let (w, h, d, t) = (0.42, 0.32, 0.32, 0.004);
-    let wall = |w: f32, d: f32, x: f32, z: f32| {
-        block(w, h, d, if x == 0.0 { ALL_FACES & !BOTTOM } else { TOP | X_LOW | X_HIGH }).moved(x, 0.0, z)
-    };
-    let walls = Shape::of([
-        block(w, t, d, TOP),
-        wall(w + 2.0 * t, t, 0.0, 0.5 * (d + t)),
-        wall(w + 2.0 * t, t, 0.0, -0.5 * (d + t)),
-        wall(t, d, 0.5 * (w + t), 0.0),
-        wall(t, d, -0.5 * (w + t), 0.0),
-    ]);
-    office.thing(group, "carton", Pose::at(0.0, 0.0, 0.0), [(CARDBOARD, walls)]);
-    let n = office.around(20);
-    let roll = crate::primitives::lathe(&[(0.02, 0.0), (0.021, 0.0), (0.021, 0.55), (0.020, 0.55), (0.020, 0.0)], n);
-    let roll = office.mesh("rolled plan", [(crate::paint::CRUMPLED, roll)]);
-    for (x, z, lean) in
-        [(-0.12, 0.05, 0.12), (-0.05, 0.05, 0.05), (0.02, 0.06, -0.10), (-0.03, -0.06, 0.08), (0.08, -0.05, -0.12)]
-    {
-        office.scene.place(group, "rolled plan", roll, Pose::at(x, t + 0.006, z).roll(lean));
     }
 }

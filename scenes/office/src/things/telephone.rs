@@ -11,7 +11,7 @@ use crate::scene::Pose;
 pub fn add(office: &mut Office, parent: Option<usize>, pose: Pose) {
     let phone = Some(office.scene.group(parent, "telephone", pose));
     let n = office.around(16);
-    let k = office.steps(2);
+    let k = office.steps(4);
     // A wedge: the back is higher than the front.
     let tilt = |loops: Vec<glam::Vec3>, rise: f32| -> Vec<glam::Vec3> {
         loops.into_iter().map(|p| p + vec3(0.0, rise * (0.11 - p.z), 0.0)).collect()
