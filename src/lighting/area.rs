@@ -30,6 +30,10 @@ const MIN_SOLID_ANGLE: f64 = 1e-7;
 /// distance is less than about 1e-9 of the light's size.
 const ON_THE_LIGHT: f64 = 1e-9;
 
+/// Rounding error of a point that is computed in f32 from three corners and two weights, as a share of the largest coordinate: gamma(7) of
+/// pbrt 4ed 6.8.4.
+const POSITION_ROUNDING: f64 = 3.5 * f32::EPSILON as f64;
+
 /// Texture samples along one side of a triangle, at most.
 const MAX_TEXTURE_STEPS: u32 = 512;
 
@@ -177,9 +181,19 @@ impl AreaLight {
             // From that far away f32 is as good as the position is
             let [e, f, cross] = self.rough;
             View::Bilinear(SeenRectangle { corner: corner.as_vec3(), edges: [e, f], cross, normal })
-        } else {
+        } else if side.abs() > self.rounding() {
             View::SolidAngle(side)
+        } else {
+            return None;
         })
+    }
+
+    /// [`AreaLight::view`]'s `side` up to which a point may lie in the light's own plane, but for the rounding of its coordinates. On a
+    /// tilted light every other point of its own surface would otherwise see it from a hair's breadth, over half of all directions.
+    fn rounding(&self) -> f64 {
+        let [e, f] = self.edges;
+        let reach = [e, f, e + f].into_iter().fold(self.corner.abs(), |reach, o| reach.max((self.corner + o).abs()));
+        POSITION_ROUNDING * reach.dot(self.cross.abs())
     }
 
     /// A point as seen from `position`. `None` from edge-on.

@@ -13,6 +13,8 @@ use crate::sampling;
 
 /// Samples a side gets before it is known how much it varies ...
 const PILOT: u32 = 8;
+/// ... once more where none of them found light ...
+const PILOT_DARK: u32 = 16;
 /// ... and where it hardly matters.
 const PILOT_FAR: u32 = 2;
 /// Fewest samples of a side, and where it hardly matters.
@@ -53,7 +55,18 @@ pub(super) fn gather(input: &RadiosityScene<'_>, patches: &Patches, seed: u32, t
     let stream = |what: u32| sampling::hash_all(&[seed, 0x00d1_9ec7, what]);
     let far = |side: usize| patches.relevance[side / 2] < FAR;
     let pilot_counts: Vec<u32> = (0..sides).map(|s| if far(s) { PILOT_FAR } else { PILOT }).collect();
-    let pilot = estimate(input, patches, &pilot_counts, stream(2));
+    let mut pilot = estimate(input, patches, &pilot_counts, stream(2));
+    let mut pilot_rays: u64 = pilot.iter().map(|e| e.rays).sum();
+    // Where half of the samples choose a light source behind the side, all eight do so on one side in 256, which would then get the fewest
+    // samples: what looks dark is looked at again.
+    let again = |side: usize| if pilot[side].mean == DVec3::ZERO && !far(side) { PILOT_DARK } else { 0 };
+    let again: Vec<u32> = (0..sides).map(again).collect();
+    for (side, second) in estimate(input, patches, &again, stream(3)).into_iter().enumerate() {
+        pilot_rays += second.rays;
+        if again[side] > 0 {
+            pilot[side] = second;
+        }
+    }
     // Sum of standard errors is least for samples in proportion to (A sigma)^(2/3).
     let weighted = |side: usize| area(side) * patches.relevance[side / 2];
     let spread: Vec<f64> = pilot.iter().enumerate().map(|(s, e)| weighted(s) * e.variance.sqrt()).collect();
@@ -73,7 +86,7 @@ pub(super) fn gather(input: &RadiosityScene<'_>, patches: &Patches, seed: u32, t
     let mut direct = Direct {
         incident: [Vec::new(), Vec::new()],
         error: if flux > 0.0 { expected / flux } else { 0.0 },
-        rays: pilot.iter().map(|e| e.rays).sum(),
+        rays: pilot_rays,
     };
     for half in 0..2 {
         let estimates = estimate(input, patches, &counts, stream(half));
@@ -113,7 +126,7 @@ fn estimate(input: &RadiosityScene<'_>, patches: &Patches, counts: &[u32], strea
                 squares[k] += value.element_sum().powi(2);
             }
             for ((estimate, square), &count) in estimates.iter_mut().zip(squares).zip(counts) {
-                let n = f64::from(count);
+                let n = f64::from(count.max(1));
                 estimate.mean /= n;
                 if count > 1 {
                     estimate.variance = (square / n - estimate.mean.element_sum().powi(2)).max(0.0) * n / (n - 1.0);

@@ -73,7 +73,7 @@ fn rad_001_furnace(case: &Case, out: &mut Outcome<'_>) {
     for (rho, expected) in RHO_FURNACE.into_iter().zip(case.values("")) {
         let room = Room::new(furnace(rho).finish());
         // The error is relative to reflected light, a share rho of all.
-        let params = |seed| one_patch(1e-3 / rho.max(0.1), seed);
+        let params = |seed| one_patch(2.5e-3 / rho.max(0.1), seed);
         for (face, b) in FACES.iter().zip(radiosities(&room, &FACES, &[1.0; 6], params)) {
             out.mean(&format!("B of {face}, rho {rho}"), expected, b, rel * expected);
         }
@@ -101,9 +101,11 @@ fn rad_001_furnace(case: &Case, out: &mut Outcome<'_>) {
 }
 
 fn rad_002_high_reflectance(case: &Case, out: &mut Outcome<'_>) {
+    // The mean of 16 seeds is then within a thousandth, half of what is allowed.
+    const ERROR: f64 = 4e-3;
     for (rho, expected) in [0.95, 0.99, 0.999].into_iter().zip(case.values("")) {
         let room = Room::new(furnace(rho).finish());
-        let params = |seed| RadiosityParams { unshot: 1e-3, ..one_patch(2e-3, seed) };
+        let params = |seed| RadiosityParams { unshot: 1e-3, ..one_patch(ERROR, seed) };
         for (face, b) in FACES.iter().zip(radiosities(&room, &FACES, &[1.0; 6], params)) {
             out.mean(&format!("B of {face}, rho {rho}"), expected, b, case.tolerance("/pipeline/rel") * expected);
         }
@@ -111,7 +113,7 @@ fn rad_002_high_reflectance(case: &Case, out: &mut Outcome<'_>) {
             method: Method::Pmm,
             patch_size: Some(10.0),
             direct: DirectLight::Shoot,
-            radiosity_error: 2e-3,
+            radiosity_error: ERROR as f32,
             unshot: 1e-3,
             ..Settings::default()
         };

@@ -184,7 +184,7 @@ impl<'a> Outcome<'a> {
         self.checks.iter().max_by(|a, b| a.strain().total_cmp(&b.strain()))
     }
 
-    /// What was measured: all that fails, else what came closest to it.
+    /// What was measured: all that fails, else what came closest to it; and how, where there is something to say.
     pub fn line(&self) -> String {
         let mut text = String::new();
         let failed: Vec<&Check> = self.checks.iter().filter(|c| !c.passes()).collect();
@@ -201,6 +201,7 @@ impl<'a> Outcome<'a> {
             .unwrap();
         }
         write!(text, "{} checks", self.checks.len()).unwrap();
+        self.notes.iter().for_each(|note| write!(text, "; {note}").unwrap());
         text
     }
 

@@ -469,3 +469,32 @@ fn samples_do_not_depend_on_company() {
     }
     assert!(kinds.iter().all(|&count| count > 50), "{kinds:?}");
 }
+
+/// Points of a tilted light are off its plane by rounding, half of them to the front: none may be lit by the light it lies on.
+#[test]
+fn tilted_lights_do_not_light_themselves() {
+    for both in [false, true] {
+        for seed in 0..16 {
+            let random = |k: u32| crate::sampling::unit(crate::sampling::hash_all(&[seed, k]));
+            let corner = |k: u32| 20.0 * Vec3::new(random(k), random(k + 1), random(k + 2)) - 10.0;
+            let polygon = vec![corner(0), corner(3), corner(6)];
+            let material = Material { double_sided: both, ..emitter(1.0) };
+            let scene = scene(&[(polygon, material)], &[]);
+            let lights = Lights::new(&scene);
+            for k in 0..256 {
+                let hit = crate::backend::Hit {
+                    t: 1.0,
+                    u: 0.9 * random(2 * k + 9),
+                    v: 0.1 * random(2 * k + 10),
+                    triangle: 0,
+                };
+                let point = crate::shading::SurfacePoint::new(&scene, &hit);
+                for normal in [point.geometric_normal, -point.geometric_normal] {
+                    let sample = lights
+                        .sample(&scene, &Lit { position: point.position, normal, u: [0.5, random(k), random(k + 1)] });
+                    assert!(sample.is_none(), "{sample:?}");
+                }
+            }
+        }
+    }
+}

@@ -42,12 +42,13 @@ fn rad_001_furnace_of_many_patches_agrees_within_its_own_deviation() {
 fn rad_002_high_reflectance() {
     for (rho, expected) in [(0.95, 20.0), (0.99, 100.0), (0.999, 1000.0)] {
         let room = closed_box([1.0; 3], [rho; 6], [1.0; 6]);
-        // Light that is reflected 1000 times makes 1000 times as many rays: the first pair of solutions must do.
-        let params = RadiosityParams { unshot: 1e-3, error: 1e-3, max_rays: 1 << 15, ..one_patch() };
+        let params = RadiosityParams { unshot: 1e-3, error: 1e-3, ..one_patch() };
         let solution = room.solve(&params).unwrap();
+        // Rays grow with the root of the number of reflections.
+        assert!(solution.rays < 100_000_000, "{} rays", solution.rays);
         for face in 0..6 {
-            // The f32 reflectance is not the decimal one; at 0.999 that changes the result by 1e-5.
-            assert_close(&format!("rho {rho} face {face}"), room.surface(&solution, face).1.x, expected, 2e-3);
+            // Five standard errors. The f32 reflectance is not the decimal one; at 0.999 that changes the result by 1e-5.
+            assert_close(&format!("rho {rho} face {face}"), room.surface(&solution, face).1.x, expected, 5e-3);
         }
     }
 }
