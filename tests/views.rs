@@ -16,10 +16,13 @@ fn gsii(folder: &Path, arguments: &[&str]) -> (Option<i32>, String) {
     (output.status.code(), String::from_utf8(output.stderr).unwrap())
 }
 
-/// Renders a small image of `room.gltf` in a folder.
+/// A small image of `room.gltf`.
+const BASE: [&str; 10] =
+    ["render", "room.gltf", "--width", "45", "--height", "30", "--spp", "4", "--measure-bias", "64"];
+
+/// Renders a small image in a folder.
 fn render(folder: &Path, arguments: &[&str]) -> String {
-    let all = ["render", "room.gltf", "--width", "45", "--height", "30", "--spp", "4", "--measure-bias", "64"];
-    let (code, text) = gsii(folder, &[&all, arguments].concat());
+    let (code, text) = gsii(folder, &[&BASE[..], arguments].concat());
     assert_eq!(code, Some(0), "{text}");
     text
 }
@@ -190,6 +193,12 @@ fn frames_are_prepared_once_skipped_when_there_and_the_same_wherever_they_are_re
     assert!(text.contains("3 of 4 frames are there already"), "{text}");
     assert!(std::fs::read(path("a-02.exr")).unwrap() == b"kept as it is" && content("a-04.exr") == files[2]);
     frames("2", &["--overwrite"]);
+    assert!(content("a-02.exr") == files[1]);
+
+    // A frame that time ran out for is there, or not even begun; --resume finishes it either way.
+    let all = [&BASE[..], &["--frames", "2", "--overwrite", "--time-limit", "0.05", "-o", "a-##.exr"]].concat();
+    gsii(folder.path(), &all);
+    frames("0-6:2", &["--resume"]);
     assert!(content("a-02.exr") == files[1]);
 
     let (code, text) = gsii(folder.path(), &["render", "room.gltf", "--frames", "0-1", "-o", "a.exr"]);

@@ -142,7 +142,8 @@ impl Animation<'_> {
                 frame: Some(frame),
                 ..view
             };
-            if overwrite || !view.outputs.iter().chain(&view.stats).all(|path| path.is_file()) {
+            let cut_short = self.options.long.goes_on(&view.outputs[0], view.checkpoint.as_deref());
+            if overwrite || cut_short || !view.outputs.iter().chain(&view.stats).all(|path| path.is_file()) {
                 views.push(view);
             }
         }

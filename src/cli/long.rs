@@ -93,12 +93,7 @@ impl LongOptions {
         if self.checkpoint_every == 0.0 {
             return Ok(None);
         }
-        let beside = || {
-            let mut name = OsString::from(image);
-            name.push(EXTENSION);
-            PathBuf::from(name)
-        };
-        let kept = Checkpoint { path: named.map_or_else(beside, Path::to_owned), identity: identity()? };
+        let kept = Checkpoint { path: place(image, named), identity: identity()? };
         let name = kept.path.display();
         match (self.resume, kept.path.exists()) {
             (true, true) => checkpoint::check(&kept.path, &kept.identity)?,
@@ -109,6 +104,11 @@ impl LongOptions {
             (false, false) => (),
         }
         Ok(Some(kept))
+    }
+
+    /// Whether `image` is to be gone on with, though it may be there: a rendering that ended early has both.
+    pub fn goes_on(&self, image: &Path, named: Option<&Path>) -> bool {
+        self.resume && place(image, named).is_file()
     }
 
     /// Where a rendering starts.
@@ -146,6 +146,16 @@ impl LongOptions {
         }
         watchers
     }
+}
+
+/// The checkpoint of `image`: what an option names, or beside it.
+fn place(image: &Path, named: Option<&Path>) -> PathBuf {
+    let beside = || {
+        let mut name = OsString::from(image);
+        name.push(EXTENSION);
+        PathBuf::from(name)
+    };
+    named.map_or_else(beside, Path::to_owned)
 }
 
 /// A file that keeps a rendering.

@@ -108,7 +108,7 @@ pub struct Options {
     #[arg(long, value_name = "FILE.json", help_heading = "Output")]
     stats: Option<PathBuf>,
     #[command(flatten)]
-    long: LongOptions,
+    pub(super) long: LongOptions,
     #[command(flatten)]
     pub(super) talk: Talk,
 }
