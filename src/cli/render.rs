@@ -302,7 +302,7 @@ impl Options {
         };
         // The paper's rule alone, where one of its errors is named.
         let by_pixel = self.error.is_none() && (self.hires_error.is_some() || self.lores_error.is_some());
-        let error = if by_pixel { f32::INFINITY } else { self.error.unwrap_or(ERROR) };
+        let error = if by_pixel || self.spp.is_some() { f32::INFINITY } else { self.error.unwrap_or(ERROR) };
         let worst = if by_pixel { PIXEL_ERROR } else { WORST_PIXEL * error };
         let (hires_error, lores_error) = (self.hires_error.unwrap_or(worst), self.lores_error.unwrap_or(worst));
         let (min_trials, max_trials) = self.spp.map_or((self.min_trials, self.max_trials), |n| (n, n));

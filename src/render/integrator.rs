@@ -225,7 +225,7 @@ impl<'a> World<'a> {
             ws.shadows.clear();
             ws.shadow_rays.clear();
             self.trace_detailed(ws, passes, coherence, &mut capture);
-            self.trace_far(ws, passes, &mut capture);
+            self.trace_far(ws, passes, coherence, &mut capture);
             self.trace_shadows(ws, coherence);
             std::mem::swap(&mut ws.paths, &mut ws.next);
             let view = coherence == Coherence::Coherent && passes.hires;
@@ -281,7 +281,13 @@ impl<'a> World<'a> {
     }
 
     /// Traces the far list in the simplified scene and looks radiosities up.
-    fn trace_far(&self, ws: &mut Workspace, passes: Passes, capture: &mut Option<&mut Vec<Captured>>) {
+    fn trace_far(
+        &self,
+        ws: &mut Workspace,
+        passes: Passes,
+        coherence: Coherence,
+        capture: &mut Option<&mut Vec<Captured>>,
+    ) {
         let Some(far) = self.far else { return };
         if ws.far.is_empty() {
             return;
@@ -289,7 +295,7 @@ impl<'a> World<'a> {
         ws.rays.clear();
         ws.rays.extend(ws.far.iter().map(|&i| ws.paths[i as usize].ray));
         ws.hits.resize(ws.rays.len(), Hit::MISS);
-        far.rays.closest(&ws.rays, Visible::All, Coherence::Incoherent, &mut ws.hits);
+        far.rays.closest(&ws.rays, Visible::All, coherence, &mut ws.hits);
         settle_edges(far.rays, &mut ws.rays, &mut ws.hits);
         ws.counts.far += ws.rays.len() as u64;
         for k in 0..ws.far.len() {

@@ -134,8 +134,7 @@ pub fn render_rounds(
 ) {
     let over = || progress.stopped();
     let mut cache = IrradianceCache::default();
-    let size = [params.width, params.height];
-    if wants_cache(world, params) && !cache.fill(world, camera, size, params.seed, &over, &mut |_| {}) {
+    if wants_cache(world, params) && !cache.fill(world, camera, params, &over, &mut |_| {}) {
         return;
     }
     let world = &World { cache: wants_cache(world, params).then_some(&cache).or(world.cache), ..*world };

@@ -15,6 +15,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use super::RenderParams;
 use super::integrator::{Captured, FarField, World};
 use super::path::{Arrival, Path};
 use super::view::ViewRays;
@@ -29,12 +30,14 @@ use record::{Record, Strata};
 
 /// Pass after pass: the distance in pixels of the places that are looked at, and the rays of a record. Records that are close
 /// together share their noise.
-const PASSES: [(u32, Strata); 4] = [
-    (16, Strata { rings: 16, sectors: 48 }),
-    (8, Strata { rings: 12, sectors: 36 }),
-    (4, Strata { rings: 10, sectors: 30 }),
-    (2, Strata { rings: 8, sectors: 24 }),
-];
+const PASSES: [(u32, f32); 4] = [(16, 768.0), (8, 432.0), (4, 300.0), (2, 192.0)];
+
+/// Relative error of an image for which records have so many rays. Noise of records is not seen in that of pixels, and falls as
+/// slowly as any.
+const ERROR: f32 = 0.015;
+
+/// Factors that the number of rays is kept between.
+const RAYS: [f32; 2] = [0.25, 4.0];
 
 /// A place that has less weight of records than this gets one of its own.
 const COVERED: f32 = 0.4;
@@ -104,8 +107,7 @@ impl IrradianceCache {
         &mut self,
         world: &World<'_>,
         camera: &Camera,
-        size: [u32; 2],
-        seed: u32,
+        params: &RenderParams,
         over: &(dyn Fn() -> bool + Sync),
         each: &mut dyn FnMut(&Self),
     ) -> bool {
@@ -113,9 +115,11 @@ impl IrradianceCache {
             self.passes = PASSES.len();
             return true;
         };
+        let (size, seed) = ([params.width, params.height], params.seed);
         let view = ViewRays::new(camera, size, hash_all(&[seed, STREAM]));
-        while let Some(&(spacing, strata)) = PASSES.get(self.passes) {
+        while let Some(&(spacing, rays)) = PASSES.get(self.passes) {
             let pass = self.passes as u32;
+            let strata = Strata::of(rays * rays_for(params.error));
             let places = self.places(world, &view, size, spacing, pass);
             while self.next < places.len() {
                 let chunk = self.next..(self.next + CHUNK).min(places.len());
@@ -226,6 +230,11 @@ impl IrradianceCache {
     }
 }
 
+/// Factor on the rays of records for an image of relative error `error`; one where none is asked for.
+fn rays_for(error: f32) -> f32 {
+    if error.is_finite() { (ERROR / error).clamp(RAYS[0], RAYS[1]) } else { 1.0 }
+}
+
 /// A place that may get a record.
 #[derive(Clone)]
 struct Place {
@@ -245,7 +254,8 @@ fn gather(
 ) -> Option<Record> {
     let Captured { point, normal, .. } = &place.captured;
     let frame = basis(*normal);
-    let paths: Vec<Path> = (0..strata.len())
+    let paths: Vec<Path> = strata
+        .in_blocks()
         .map(|k| {
             let [u, v, near, _] = sobol(k as u32, 0, stream);
             let direction = strata.direction(&frame, k, [u, v]);

@@ -20,6 +20,23 @@ impl Strata {
         self.rings * self.sectors
     }
 
+    /// Strata for about so many rays, as wide as high.
+    pub fn of(rays: f32) -> Self {
+        let rings = ((rays / 3.0).sqrt().round() as usize).max(4);
+        Strata { rings, sectors: 3 * rings }
+    }
+
+    /// Numbers of all rays, in blocks of neighbouring directions.
+    pub fn in_blocks(self) -> impl Iterator<Item = usize> {
+        let blocks = |count: usize, of: usize| (0..count).step_by(of).map(move |low| low..(low + of).min(count));
+        let (rings, sectors) = BLOCK;
+        blocks(self.rings, rings).flat_map(move |rings| {
+            blocks(self.sectors, sectors).flat_map(move |sectors| {
+                rings.clone().flat_map(move |ring| sectors.clone().map(move |sector| ring * self.sectors + sector))
+            })
+        })
+    }
+
     /// The direction of ray `k` (ring by ring) around the third axis of `frame`, cosine-distributed in its stratum; `u` uniform in 0..1.
     pub fn direction(self, frame: &Mat3, k: usize, u: [f32; 2]) -> Vec3 {
         let (ring, sector) = (k / self.sectors, k % self.sectors);
@@ -29,6 +46,9 @@ impl Strata {
         *frame * Vec3::new(radius * cos, radius * sin, (1.0 - sin2).max(0.0).sqrt())
     }
 }
+
+/// Rings and sectors of a block of rays that are traced as one packet.
+const BLOCK: (usize, usize) = (4, 2);
 
 /// Largest angle between normals over which a record is used: 20 degrees, as the cosine.
 pub(super) const LEAST_COSINE: f32 = 0.939_692_6;
@@ -193,6 +213,16 @@ mod tests {
             })
             .unzip();
         Record::new(position, normal, 0.1, strata, &radiance, &distances).unwrap()
+    }
+
+    #[test]
+    fn blocks_hold_every_ray_once() {
+        for strata in [Strata { rings: 16, sectors: 48 }, Strata { rings: 7, sectors: 21 }, Strata::of(1.0)] {
+            let mut all: Vec<usize> = strata.in_blocks().collect();
+            all.sort_unstable();
+            assert_eq!(all, (0..strata.len()).collect::<Vec<_>>());
+        }
+        assert_eq!(Strata::of(768.0), Strata { rings: 16, sectors: 48 });
     }
 
     /// Light that depends on the direction only: `L = 1 + x` gives `E / pi = 1 + 2/3 n_x`.
