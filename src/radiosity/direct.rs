@@ -1,27 +1,28 @@
 //! Direct light on patches by sampling the light sources.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::RadiosityScene;
 use super::patches::Patches;
 use super::shoot::side_normal;
 use crate::backend::{Coherence, Ray};
-use crate::lighting::Lit;
 use crate::lighting::shadow::{ShadowBuffers, ShadowRay, light_visibility};
+use crate::lighting::{LightSample, Lit};
 use crate::sampling;
+use crate::shading::SurfacePoint;
 
 /// Samples a side gets before it is known how much it varies ...
-const PILOT: u32 = 8;
+const PILOT: u32 = 4;
 /// ... once more where none of them found light ...
-const PILOT_DARK: u32 = 16;
+const PILOT_DARK: u32 = 8;
 /// ... and where it hardly matters.
 const PILOT_FAR: u32 = 2;
 /// Fewest samples of a side, and where it hardly matters.
-const LEAST: [u32; 2] = [4, 1];
+const LEAST: [u32; 2] = [2, 1];
 /// Most samples of a side.
 const MOST: u32 = 1 << 14;
-/// Relevance below which a side hardly matters.
+/// Relevance, or share of the mean of area times relevance, below which a side hardly matters.
 const FAR: f64 = 0.05;
 /// Sides looked at by one job.
 const JOB: usize = 64;
@@ -53,11 +54,13 @@ pub(super) fn gather(input: &RadiosityScene<'_>, patches: &Patches, seed: u32, t
     let sides = 2 * patches.len();
     let area = |side: usize| patches.open_area(side as u32);
     let stream = |what: u32| sampling::hash_all(&[seed, 0x00d1_9ec7, what]);
-    let far = |side: usize| patches.relevance[side / 2] < FAR;
+    let weighted = |side: usize| area(side) * patches.relevance[side / 2];
+    let mean = (0..sides).map(weighted).sum::<f64>() / sides as f64;
+    let far = |side: usize| patches.relevance[side / 2] < FAR || weighted(side) < FAR * mean;
     let pilot_counts: Vec<u32> = (0..sides).map(|s| if far(s) { PILOT_FAR } else { PILOT }).collect();
     let mut pilot = estimate(input, patches, &pilot_counts, stream(2));
     let mut pilot_rays: u64 = pilot.iter().map(|e| e.rays).sum();
-    // Where half of the samples choose a light source behind the side, all eight do so on one side in 256, which would then get the fewest
+    // Where half of the samples choose a light source behind the side, all four do so on one side in 16, which would then get the fewest
     // samples: what looks dark is looked at again.
     let again = |side: usize| if pilot[side].mean == DVec3::ZERO && !far(side) { PILOT_DARK } else { 0 };
     let again: Vec<u32> = (0..sides).map(again).collect();
@@ -68,7 +71,6 @@ pub(super) fn gather(input: &RadiosityScene<'_>, patches: &Patches, seed: u32, t
         }
     }
     // Sum of standard errors is least for samples in proportion to (A sigma)^(2/3).
-    let weighted = |side: usize| area(side) * patches.relevance[side / 2];
     let spread: Vec<f64> = pilot.iter().enumerate().map(|(s, e)| weighted(s) * e.variance.sqrt()).collect();
     let flux: f64 = pilot.iter().enumerate().map(|(s, e)| weighted(s) * e.mean.element_sum()).sum();
     let weight: f64 = spread.iter().map(|x| x.cbrt().powi(2)).sum();
@@ -101,29 +103,60 @@ fn estimate(input: &RadiosityScene<'_>, patches: &Patches, counts: &[u32], strea
     counts
         .par_chunks(JOB)
         .enumerate()
-        .flat_map_iter(|(job, counts)| {
-            let mut rays = Vec::new();
-            let mut values: Vec<(usize, DVec3)> = Vec::new();
+        .map_init(Buffers::default, |buffers, (job, counts)| {
+            let Buffers { points, lit, samples, owners, rays, values, through, shadow } = buffers;
+            points.clear();
+            lit.clear();
+            owners.clear();
             for (k, &count) in counts.iter().enumerate() {
                 let side = (job * JOB + k) as u32;
+                if patches.is_inside_of_box(side) {
+                    continue;
+                }
+                let stream = sampling::hash_all(&[stream, side]);
                 for i in 0..count {
-                    if let Some((ray, value)) = sample(input, patches, side, i, stream) {
-                        rays.push(ray);
-                        values.push((k, value));
-                    }
+                    let s = sampling::sobol(i, 0, stream);
+                    let choice = sampling::sobol(i, 1, stream)[0];
+                    let point = patches.open_point(input.geometry, side, [s[0], s[1]]);
+                    lit.push(Lit {
+                        position: point.position,
+                        normal: side_normal(&point, side),
+                        u: [choice, s[2], s[3]],
+                    });
+                    points.push(point);
+                    owners.push(k as u32);
                 }
             }
-            let mut through = vec![glam::Vec3::ONE; rays.len()];
+            input.lights.sample_all(input.scene, lit, samples);
+            rays.clear();
+            values.clear();
+            for (((point, lit), sample), &owner) in points.iter().zip(lit.iter()).zip(samples.iter()).zip(owners.iter())
+            {
+                let Some(light) = sample else { continue };
+                let cos = light.direction.dot(lit.normal);
+                if cos <= 0.0 || light.weight.max_element() <= 0.0 {
+                    continue;
+                }
+                let ray = Ray {
+                    origin: point.ray_origin(light.direction),
+                    t_near: 0.0,
+                    direction: light.direction,
+                    t_far: light.distance,
+                };
+                rays.push(ShadowRay { ray, light: light.triangle });
+                values.push((owner, f64::from(cos) * light.weight.as_dvec3()));
+            }
+            through.clear();
+            through.resize(rays.len(), Vec3::ONE);
             let sources = Some(input.geometry.sources.as_slice());
-            let buffers = &mut ShadowBuffers::default();
-            light_visibility(input.rays, input.scene, sources, &rays, Coherence::Coherent, buffers, &mut through);
+            light_visibility(input.rays, input.scene, sources, rays, Coherence::Coherent, shadow, through);
             let mut estimates = vec![Estimate::default(); counts.len()];
-            let mut squares = vec![0.0; counts.len()];
-            for ((k, value), seen) in values.into_iter().zip(through) {
+            let mut squares = [0.0; JOB];
+            for (&(k, value), seen) in values.iter().zip(through.iter()) {
                 let value = value * seen.as_dvec3();
-                estimates[k].mean += value;
-                estimates[k].rays += 1;
-                squares[k] += value.element_sum().powi(2);
+                estimates[k as usize].mean += value;
+                estimates[k as usize].rays += 1;
+                squares[k as usize] += value.element_sum().powi(2);
             }
             for ((estimate, square), &count) in estimates.iter_mut().zip(squares).zip(counts) {
                 let n = f64::from(count.max(1));
@@ -134,37 +167,21 @@ fn estimate(input: &RadiosityScene<'_>, patches: &Patches, counts: &[u32], strea
             }
             estimates
         })
+        .flatten_iter()
         .collect()
 }
 
-/// A shadow ray and the irradiance it brings when nothing is in its way.
-fn sample(
-    input: &RadiosityScene<'_>,
-    patches: &Patches,
-    side: u32,
-    index: u32,
-    stream: u32,
-) -> Option<(ShadowRay, DVec3)> {
-    if patches.is_inside_of_box(side) {
-        return None;
-    }
-    let stream = sampling::hash_all(&[stream, side]);
-    let s = sampling::sobol(index, 0, stream);
-    let choice = sampling::sobol(index, 1, stream)[0];
-    let point = patches.open_point(input.geometry, side, [s[0], s[1]]);
-    let normal = side_normal(&point, side);
-    let lit = Lit { position: point.position, normal, u: [choice, s[2], s[3]] };
-    let light = input.lights.sample(input.scene, &lit)?;
-    let cos = light.direction.dot(normal);
-    if cos <= 0.0 || light.weight.max_element() <= 0.0 {
-        return None;
-    }
-    let ray = Ray {
-        origin: point.ray_origin(light.direction),
-        t_near: 0.0,
-        direction: light.direction,
-        t_far: light.distance,
-    };
-    let shadow = ShadowRay { ray, light: light.triangle };
-    Some((shadow, f64::from(cos) * light.weight.as_dvec3()))
+/// Memory that jobs share.
+#[derive(Default)]
+struct Buffers {
+    points: Vec<SurfacePoint>,
+    lit: Vec<Lit>,
+    samples: Vec<Option<LightSample>>,
+    /// Number of the side in its job, for each point.
+    owners: Vec<u32>,
+    rays: Vec<ShadowRay>,
+    /// For each ray the number of its side, and the irradiance it brings when nothing is in its way.
+    values: Vec<(u32, DVec3)>,
+    through: Vec<Vec3>,
+    shadow: ShadowBuffers,
 }

@@ -1,5 +1,7 @@
 //! Progressive refinement: the sides with the largest unshot flux shoot first, until little is left.
 
+use std::ops::Range;
+
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -9,14 +11,49 @@ use crate::error::{Error, Result};
 use crate::progress::Progress;
 use crate::sampling;
 
-/// Share of the unshot flux that one batch of shots takes: as many sides as are needed, largest first.
-const BATCH: f64 = 0.5;
-/// Fewest sides that are worth another thread.
-const SIDES_OF_A_JOB: usize = 1024;
+/// Share of the unshot flux that one batch of shots takes at least: as many sides as are needed, largest first.
+const BATCH: f64 = 0.75;
+/// Sides that are looked at by one job.
+const SIDES_OF_A_JOB: usize = 4096;
+/// Leading bits of an importance, behind its sign, that tell how large it is: exponent and four bits, steps of 2 to 3 %.
+const STEP_BITS: u32 = 11 + 4;
 /// A scene is given up when it has shot its light this many times over ...
 const HOPELESS_SHOTS: f64 = 10.0;
 /// ... and lost less than this share of what it shot.
 const HOPELESS_LOSS: f64 = 1e-5;
+
+/// What has arrived and was not shot yet.
+#[derive(Default)]
+pub(super) struct Unshot {
+    /// Of all sides, W.
+    flux: DVec3,
+    /// The same in all bands, each side weighted with its relevance.
+    relevant: f64,
+    /// Importance of what each side has.
+    importance: Vec<f64>,
+}
+
+impl Unshot {
+    /// The importance from which on sides together have at least `share` of all of it; above 0. Found to one step of [`STEP_BITS`], so
+    /// that nothing need be sorted.
+    fn least_of_largest(&self, share: f64) -> f64 {
+        let shift = 63 - STEP_BITS;
+        let mut steps = vec![0.0; 1 << STEP_BITS];
+        // Those that are not above 0 have a sign, or are smaller than every other.
+        for &importance in self.importance.iter().filter(|&&x| x > 0.0) {
+            steps[(importance.to_bits() >> shift) as usize] += importance;
+        }
+        let total: f64 = steps.iter().sum();
+        let mut sum = 0.0;
+        for (step, within) in steps.iter().enumerate().rev() {
+            sum += within;
+            if sum >= share * total {
+                return f64::from_bits((step as u64) << shift).max(f64::MIN_POSITIVE);
+            }
+        }
+        f64::MIN_POSITIVE
+    }
+}
 
 /// One independent solution in the making. Flux in W, one entry a side.
 pub(super) struct Run<'a> {
@@ -32,6 +69,8 @@ pub(super) struct Run<'a> {
     tally: Tally,
     /// `tally` when only the light sources had shot.
     tally_direct: Tally,
+    /// How much of `direct`, in all bands, is relevant; 1 with equal weights.
+    relevant_direct: f64,
     /// Number of shots.
     pub shots: u64,
     stream: u32,
@@ -43,7 +82,14 @@ impl<'a> Run<'a> {
     pub fn new(tracer: &'a Tracer<'a>, direct: Vec<DVec3>, emitted: DVec3, tally: Tally, stream: u32) -> Self {
         let incident = direct.clone();
         let shot = vec![DVec3::ZERO; direct.len()];
-        Run { tracer, direct, incident, shot, emitted, tally, tally_direct: tally, shots: 0, stream }
+        let (mut all, mut relevant) = (0.0, 0.0);
+        for (patch, sides) in direct.chunks(2).enumerate() {
+            let flux: f64 = sides.iter().map(|flux| flux.element_sum()).sum();
+            all += flux;
+            relevant += tracer.patches.relevance[patch] * flux;
+        }
+        let relevant_direct = if all > 0.0 { relevant / all } else { 1.0 };
+        Run { tracer, direct, incident, shot, emitted, tally, tally_direct: tally, relevant_direct, shots: 0, stream }
     }
 
     /// Rays traced so far.
@@ -81,17 +127,43 @@ impl<'a> Run<'a> {
         self.tracer.patches.relevance[side / 2] * shares.sum::<f64>()
     }
 
+    /// What is unshot now.
+    pub fn survey(&self) -> Unshot {
+        let of_job = |sides: Range<usize>| {
+            let mut unshot = Unshot { importance: Vec::with_capacity(sides.len()), ..Unshot::default() };
+            for side in sides {
+                let flux = self.unshot(side);
+                unshot.flux += flux;
+                unshot.relevant += self.tracer.patches.relevance[side / 2] * flux.element_sum();
+                unshot.importance.push(self.importance(side, flux));
+            }
+            unshot
+        };
+        let sides = self.incident.len();
+        let jobs: Vec<Unshot> = (0..sides.div_ceil(SIDES_OF_A_JOB))
+            .into_par_iter()
+            .map(|job| of_job(job * SIDES_OF_A_JOB..((job + 1) * SIDES_OF_A_JOB).min(sides)))
+            .collect();
+        // In order, for the same sum with any number of threads.
+        let mut all = Unshot { importance: Vec::with_capacity(sides), ..Unshot::default() };
+        for job in jobs {
+            all.flux += job.flux;
+            all.relevant += job.relevant;
+            all.importance.extend(job.importance);
+        }
+        all
+    }
+
     /// How much more (or less) of what is relevant is unshot than of everything, each in proportion to the light it got from light
     /// sources; 1 with equal weights.
-    fn relevant_unshot(&self) -> f64 {
-        let weigh = |flux: &dyn Fn(usize) -> DVec3| -> [f64; 2] {
-            (0..self.incident.len()).fold([0.0; 2], |[all, relevant], side| {
-                let flux = flux(side).element_sum();
-                [all + flux, relevant + self.tracer.patches.relevance[side / 2] * flux]
-            })
-        };
-        let (unshot, direct) = (weigh(&|side| self.unshot(side)), weigh(&|side| self.direct[side]));
-        if unshot[0] > 0.0 && direct[1] > 0.0 { unshot[1] / unshot[0] * (direct[0] / direct[1]) } else { 1.0 }
+    fn relevant_unshot(&self, unshot: &Unshot) -> f64 {
+        let all = unshot.flux.element_sum();
+        if all > 0.0 && self.relevant_direct > 0.0 { unshot.relevant / all / self.relevant_direct } else { 1.0 }
+    }
+
+    /// Unshot over emitted flux, the largest of the bands.
+    fn unshot_share(&self, unshot: &Unshot) -> f64 {
+        Ledger { emitted: self.emitted.to_array(), unshot: unshot.flux.to_array(), ..Ledger::default() }.unshot_share()
     }
 
     /// Shoots with `rays` rays for the light that is unshot at the start, until the share of unshot flux is below `limit`.
@@ -104,33 +176,29 @@ impl<'a> Run<'a> {
     /// # Errors
     /// [`Error::Unsolvable`] when the light does not decrease.
     pub fn refine(&mut self, rays: u64, limit: f64, progress: &Progress) -> Result<()> {
-        // In a thread of the pool, which then need not be woken for each of perhaps thousands of small batches.
-        rayon::scope(|_| self.refine_within_pool(rays, limit, progress))
-    }
-
-    fn refine_within_pool(&mut self, rays: u64, limit: f64, progress: &Progress) -> Result<()> {
-        let initial: f64 = (0..self.incident.len()).map(|s| self.importance(s, self.unshot(s))).sum();
+        let mut unshot = self.survey();
+        let initial: f64 = unshot.importance.iter().sum();
         let mut shot = 0.0;
         let total_steps = 1000.0;
         let bar = progress.stage("radiosity", total_steps as u64);
         loop {
-            let ledger = self.ledger();
-            debug_assert!(ledger.imbalance() < 1e-6, "energy is not conserved: {ledger:?}");
-            let share = ledger.unshot_share() * self.relevant_unshot();
+            debug_assert!(self.ledger().imbalance() < 1e-6, "energy is not conserved: {:?}", self.ledger());
+            let share = self.unshot_share(&unshot) * self.relevant_unshot(&unshot);
             if share < limit || progress.stopped() {
                 break;
             }
             bar.set_position((total_steps * (share.min(1.0).ln() / limit.ln()).clamp(0.0, 1.0)) as u64);
-            self.check_solvable(&ledger)?;
-            shot += self.step(rays as f64 / (initial * initial.max(shot)).sqrt());
+            self.check_solvable(&unshot)?;
+            shot += self.step(&unshot, rays as f64 / (initial * initial.max(shot)).sqrt());
+            unshot = self.survey();
         }
         bar.finish_and_clear();
         Ok(())
     }
 
     /// One batch of shots, with `density` rays for each unit of importance. Returns their importance.
-    pub fn step(&mut self, density: f64) -> f64 {
-        let (shots, importance) = self.next_shots(density);
+    pub fn step(&mut self, unshot: &Unshot, density: f64) -> f64 {
+        let (shots, importance) = self.next_shots(unshot, density);
         for shot in &shots {
             let side = shot.side as usize;
             self.shot[side] = self.reflectance(side) * self.incident[side];
@@ -141,38 +209,27 @@ impl<'a> Run<'a> {
         importance
     }
 
-    /// The smallest set of sides that holds a share of [`BATCH`] of the unshot flux, and the importance of what they shoot.
-    fn next_shots(&self, density: f64) -> (Vec<Shot>, f64) {
-        let mut order: Vec<(f64, u32)> = (0..self.incident.len())
-            .into_par_iter()
-            .with_min_len(SIDES_OF_A_JOB)
-            .map(|side| (self.importance(side, self.unshot(side)), side as u32))
-            .filter(|&(importance, _)| importance > 0.0)
-            .collect();
-        order.par_sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-        let total: f64 = order.iter().map(|o| o.0).sum();
-        let (mut count, mut sum) = (0, 0.0);
-        while count < order.len() && sum < BATCH * total {
-            sum += order[count].0;
-            count += 1;
+    /// The sides with the largest unshot flux that hold a share of [`BATCH`] of it, and the importance of what they shoot.
+    fn next_shots(&self, unshot: &Unshot, density: f64) -> (Vec<Shot>, f64) {
+        let least = unshot.least_of_largest(BATCH);
+        let (mut shots, mut sum) = (Vec::new(), 0.0);
+        for (side, &importance) in (0u32..).zip(&unshot.importance) {
+            if importance < least {
+                continue;
+            }
+            sum += importance;
+            let rays = (importance * density).round().clamp(1.0, u32::MAX.into()) as u32;
+            let stream = sampling::hash_all(&[self.stream, side, (self.shots + shots.len() as u64) as u32]);
+            shots.push(Shot { side, rays, flux: self.unshot(side as usize) / f64::from(rays), stream });
         }
-        let shots = order[..count]
-            .iter()
-            .zip(self.shots..)
-            .map(|(&(importance, side), number)| {
-                let rays = (importance * density).round().clamp(1.0, u32::MAX.into()) as u32;
-                let stream = sampling::hash_all(&[self.stream, side, number as u32]);
-                Shot { side, rays, flux: self.unshot(side as usize) / f64::from(rays), stream }
-            })
-            .collect();
         (shots, sum)
     }
 
-    fn check_solvable(&self, ledger: &Ledger) -> Result<()> {
+    fn check_solvable(&self, unshot: &Unshot) -> Result<()> {
         let shot: DVec3 = self.shot.iter().sum();
         for c in 0..3 {
             let start = self.emitted[c];
-            let lost = ledger.emitted[c] - ledger.unshot[c];
+            let lost = start - unshot.flux[c];
             if start > 0.0 && shot[c] > HOPELESS_SHOTS * start && lost < HOPELESS_LOSS * shot[c] {
                 return Err(Error::Unsolvable(format!(
                     "light cannot leave the scene: it was reflected {:.0} times over and lost {:.1e} of it; surfaces that \
@@ -192,14 +249,14 @@ impl<'a> Run<'a> {
         if !ambient {
             return self.incident.clone();
         }
-        let ledger = self.ledger();
+        let unshot = self.survey();
         let mut lost = self.tally.escaped - self.tally_direct.escaped + self.tally.lost
             - self.tally_direct.lost
             - (self.tally.passed_on - self.tally_direct.passed_on);
         for (side, (incident, direct)) in self.incident.iter().zip(&self.direct).enumerate() {
             lost += (1.0 - self.reflectance(side)) * (incident - direct);
         }
-        let unshot = DVec3::from_array(ledger.unshot) * self.relevant_unshot();
+        let unshot = unshot.flux * self.relevant_unshot(&unshot);
         let factor = DVec3::from_array(std::array::from_fn(|c| if lost[c] > 0.0 { unshot[c] / lost[c] } else { 0.0 }));
         self.incident.iter().zip(&self.direct).map(|(i, d)| i + factor * (i - d)).collect()
     }

@@ -195,7 +195,8 @@ fn rad_012_and_013_energy_after_every_shot() {
     assert_close("emitted", emitted, 6.0 + 0.3 * 3.0, 1e-6);
     let mut run = Run::new(&tracer, light.incident, light.flux, light.tally, 8);
     for _ in 0..20 {
-        run.step(5000.0);
+        let unshot = run.survey();
+        run.step(&unshot, 5000.0);
         let ledger = run.ledger();
         let incident: f64 = run.incident(false).iter().map(|f| f.x).sum();
         let identity = 0.5 * (emitted + 0.5 * incident) + 0.5 * ledger.unshot[0] - emitted;

@@ -22,7 +22,7 @@ use crate::scene::Scene;
 pub const LEAST_LINES: u32 = 512;
 
 /// Relative standard error of `p` at which no more lines are needed.
-const WANTED_ERROR: f64 = 0.02;
+const WANTED_ERROR: f64 = 0.04;
 
 /// Lines followed at a time.
 const BATCH: u32 = 512;
