@@ -150,8 +150,14 @@ pub struct RadiosityScene<'a> {
 
 /// Rays of the first solution for each lit side, in proportion to its relevance: enough to estimate the error.
 const FIRST_RAYS: f64 = 4.0;
+/// The same for few sides, where another solution would cost more than what it could save in rays ...
+const FIRST_RAYS_OF_FEW: f64 = 16.0;
+/// ... up to this number of rays.
+const FEW_RAYS: f64 = 65536.0;
 /// Fewest rays that the light of the first bounce is shot with.
 const LEAST_RAYS: u64 = 1 << 13;
+/// Share of the error asked for that is left to direct light; it adds to the rest by squares.
+const ERROR_OF_DIRECT: f64 = 0.7;
 /// Solutions that may be averaged to reach the error.
 const MAX_ROUNDS: u32 = 4;
 
@@ -222,7 +228,10 @@ impl Average {
     fn solve(&mut self, tracer: &Tracer<'_>, params: &RadiosityParams, progress: &Progress) -> Result<()> {
         let target = f64::from(params.error);
         let direct = match params.direct {
-            DirectLight::Gather => Some(direct::gather(tracer.input, tracer.patches, params.seed, 0.5 * target)),
+            DirectLight::Gather => Some({
+                let target = ERROR_OF_DIRECT * target;
+                direct::gather(tracer.input, tracer.patches, params.seed, target)
+            }),
             DirectLight::Shoot => None,
         };
         self.rays += direct.as_ref().map_or(0, |d| d.rays);
@@ -236,7 +245,8 @@ impl Average {
         };
         // Direct light is gathered once; more shooting does not reduce its error.
         let of_direct = direct.as_ref().map_or(0.0, |d| d.error).min(0.9 * target);
-        let mut rays = ((FIRST_RAYS * lit) as u64).max(LEAST_RAYS);
+        let first = (FIRST_RAYS_OF_FEW * lit).min(FEW_RAYS).max(FIRST_RAYS * lit);
+        let mut rays = (first as u64).max(LEAST_RAYS);
         let mut total = 0;
         for round in 0..MAX_ROUNDS {
             self.add_pair(tracer, params, direct.as_ref(), rays, round, progress)?;

@@ -1,7 +1,5 @@
 //! Progressive refinement: the sides with the largest unshot flux shoot first, until little is left.
 
-use std::ops::Range;
-
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -15,8 +13,8 @@ use crate::sampling;
 const BATCH: f64 = 0.75;
 /// Sides that are looked at by one job.
 const SIDES_OF_A_JOB: usize = 4096;
-/// Leading bits of an importance, behind its sign, that tell how large it is: exponent and four bits, steps of 2 to 3 %.
-const STEP_BITS: u32 = 11 + 4;
+/// Leading bits of an importance, behind its sign, that tell how large it is: exponent and four bits, steps of 3 to 6 %.
+const STEP_BITS: u32 = 8 + 4;
 /// A scene is given up when it has shot its light this many times over ...
 const HOPELESS_SHOTS: f64 = 10.0;
 /// ... and lost less than this share of what it shot.
@@ -30,28 +28,27 @@ pub(super) struct Unshot {
     /// The same in all bands, each side weighted with its relevance.
     relevant: f64,
     /// Importance of what each side has.
-    importance: Vec<f64>,
+    importance: Vec<f32>,
 }
 
 impl Unshot {
     /// The importance from which on sides together have at least `share` of all of it; above 0. Found to one step of [`STEP_BITS`], so
     /// that nothing need be sorted.
-    fn least_of_largest(&self, share: f64) -> f64 {
-        let shift = 63 - STEP_BITS;
-        let mut steps = vec![0.0; 1 << STEP_BITS];
-        // Those that are not above 0 have a sign, or are smaller than every other.
+    fn least_of_largest(&self, share: f64) -> f32 {
+        let shift = 31 - STEP_BITS;
+        let mut steps = [0.0; 1 << STEP_BITS];
         for &importance in self.importance.iter().filter(|&&x| x > 0.0) {
-            steps[(importance.to_bits() >> shift) as usize] += importance;
+            steps[(importance.to_bits() >> shift) as usize] += f64::from(importance);
         }
         let total: f64 = steps.iter().sum();
         let mut sum = 0.0;
         for (step, within) in steps.iter().enumerate().rev() {
             sum += within;
             if sum >= share * total {
-                return f64::from_bits((step as u64) << shift).max(f64::MIN_POSITIVE);
+                return f32::from_bits((step as u32) << shift).max(f32::MIN_POSITIVE);
             }
         }
-        f64::MIN_POSITIVE
+        f32::MIN_POSITIVE
     }
 }
 
@@ -64,8 +61,12 @@ pub(super) struct Run<'a> {
     incident: Vec<DVec3>,
     /// Reflected light that was shot.
     shot: Vec<DVec3>,
+    /// The sum of it.
+    all_shot: DVec3,
     /// Light that the ledger starts from.
     emitted: DVec3,
+    /// Its inverse, 0 in bands without light.
+    per_emitted: DVec3,
     tally: Tally,
     /// `tally` when only the light sources had shot.
     tally_direct: Tally,
@@ -88,8 +89,20 @@ impl<'a> Run<'a> {
             all += flux;
             relevant += tracer.patches.relevance[patch] * flux;
         }
-        let relevant_direct = if all > 0.0 { relevant / all } else { 1.0 };
-        Run { tracer, direct, incident, shot, emitted, tally, tally_direct: tally, relevant_direct, shots: 0, stream }
+        Run {
+            tracer,
+            direct,
+            incident,
+            shot,
+            all_shot: DVec3::ZERO,
+            emitted,
+            per_emitted: DVec3::select(emitted.cmpgt(DVec3::ZERO), 1.0 / emitted, DVec3::ZERO),
+            tally,
+            tally_direct: tally,
+            relevant_direct: if all > 0.0 { relevant / all } else { 1.0 },
+            shots: 0,
+            stream,
+        }
     }
 
     /// Rays traced so far.
@@ -123,35 +136,27 @@ impl<'a> Run<'a> {
     /// What flux of a side counts in choosing what to shoot and with how many rays: each band by its share in the emitted flux,
     /// so that none is left behind, and by how relevant the side is.
     fn importance(&self, side: usize, flux: DVec3) -> f64 {
-        let shares = (0..3).filter(|&c| self.emitted[c] > 0.0).map(|c| flux[c] / self.emitted[c]);
-        self.tracer.patches.relevance[side / 2] * shares.sum::<f64>()
+        self.tracer.patches.relevance[side / 2] * flux.dot(self.per_emitted)
     }
 
-    /// What is unshot now.
-    pub fn survey(&self) -> Unshot {
-        let of_job = |sides: Range<usize>| {
-            let mut unshot = Unshot { importance: Vec::with_capacity(sides.len()), ..Unshot::default() };
-            for side in sides {
-                let flux = self.unshot(side);
-                unshot.flux += flux;
-                unshot.relevant += self.tracer.patches.relevance[side / 2] * flux.element_sum();
-                unshot.importance.push(self.importance(side, flux));
+    /// Finds out what is unshot now.
+    pub fn survey(&self, unshot: &mut Unshot) {
+        unshot.importance.resize(self.incident.len(), 0.0);
+        let of_job = |(job, importance): (usize, &mut [f32])| {
+            let (mut flux, mut relevant) = (DVec3::ZERO, 0.0);
+            for (side, importance) in (job * SIDES_OF_A_JOB..).zip(importance) {
+                let of_side = self.unshot(side);
+                flux += of_side;
+                relevant += self.tracer.patches.relevance[side / 2] * of_side.element_sum();
+                *importance = self.importance(side, of_side) as f32;
             }
-            unshot
+            (flux, relevant)
         };
-        let sides = self.incident.len();
-        let jobs: Vec<Unshot> = (0..sides.div_ceil(SIDES_OF_A_JOB))
-            .into_par_iter()
-            .map(|job| of_job(job * SIDES_OF_A_JOB..((job + 1) * SIDES_OF_A_JOB).min(sides)))
-            .collect();
+        let jobs: Vec<(DVec3, f64)> =
+            unshot.importance.par_chunks_mut(SIDES_OF_A_JOB).enumerate().map(of_job).collect();
         // In order, for the same sum with any number of threads.
-        let mut all = Unshot { importance: Vec::with_capacity(sides), ..Unshot::default() };
-        for job in jobs {
-            all.flux += job.flux;
-            all.relevant += job.relevant;
-            all.importance.extend(job.importance);
-        }
-        all
+        let sum = |sum: (DVec3, f64), job: (DVec3, f64)| (sum.0 + job.0, sum.1 + job.1);
+        (unshot.flux, unshot.relevant) = jobs.into_iter().fold((DVec3::ZERO, 0.0), sum);
     }
 
     /// How much more (or less) of what is relevant is unshot than of everything, each in proportion to the light it got from light
@@ -176,8 +181,9 @@ impl<'a> Run<'a> {
     /// # Errors
     /// [`Error::Unsolvable`] when the light does not decrease.
     pub fn refine(&mut self, rays: u64, limit: f64, progress: &Progress) -> Result<()> {
-        let mut unshot = self.survey();
-        let initial: f64 = unshot.importance.iter().sum();
+        let mut unshot = Unshot::default();
+        self.survey(&mut unshot);
+        let initial: f64 = unshot.importance.iter().copied().map(f64::from).sum();
         let mut shot = 0.0;
         let total_steps = 1000.0;
         let bar = progress.stage("radiosity", total_steps as u64);
@@ -190,7 +196,7 @@ impl<'a> Run<'a> {
             bar.set_position((total_steps * (share.min(1.0).ln() / limit.ln()).clamp(0.0, 1.0)) as u64);
             self.check_solvable(&unshot)?;
             shot += self.step(&unshot, rays as f64 / (initial * initial.max(shot)).sqrt());
-            unshot = self.survey();
+            self.survey(&mut unshot);
         }
         bar.finish_and_clear();
         Ok(())
@@ -201,6 +207,7 @@ impl<'a> Run<'a> {
         let (shots, importance) = self.next_shots(unshot, density);
         for shot in &shots {
             let side = shot.side as usize;
+            self.all_shot += self.unshot(side);
             self.shot[side] = self.reflectance(side) * self.incident[side];
         }
         let tally = self.tracer.shoot(&shots, &mut self.incident);
@@ -217,6 +224,7 @@ impl<'a> Run<'a> {
             if importance < least {
                 continue;
             }
+            let importance = f64::from(importance);
             sum += importance;
             let rays = (importance * density).round().clamp(1.0, u32::MAX.into()) as u32;
             let stream = sampling::hash_all(&[self.stream, side, (self.shots + shots.len() as u64) as u32]);
@@ -226,7 +234,7 @@ impl<'a> Run<'a> {
     }
 
     fn check_solvable(&self, unshot: &Unshot) -> Result<()> {
-        let shot: DVec3 = self.shot.iter().sum();
+        let shot = self.all_shot;
         for c in 0..3 {
             let start = self.emitted[c];
             let lost = start - unshot.flux[c];
@@ -249,7 +257,8 @@ impl<'a> Run<'a> {
         if !ambient {
             return self.incident.clone();
         }
-        let unshot = self.survey();
+        let mut unshot = Unshot::default();
+        self.survey(&mut unshot);
         let mut lost = self.tally.escaped - self.tally_direct.escaped + self.tally.lost
             - self.tally_direct.lost
             - (self.tally.passed_on - self.tally_direct.passed_on);

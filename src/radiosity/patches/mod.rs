@@ -7,7 +7,7 @@ mod charts;
 mod exposure;
 mod grid;
 mod join;
-mod neighbours;
+pub(super) mod neighbours;
 mod sampling;
 
 use std::collections::VecDeque;

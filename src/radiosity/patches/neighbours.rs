@@ -31,7 +31,11 @@ struct Extent {
 
 /// For each side, whether some part of another patch, or of a bent patch itself, may lie in front of it within `reach` of the patch's
 /// diameter. Never false where a ray along the normal would find something, but for what coincides with the patch.
-pub(super) fn may_be_covered(geometry: &SimplifiedGeometry, patches: &Patches, reach: f32) -> Vec<[bool; 2]> {
+pub(in crate::radiosity) fn may_be_covered(
+    geometry: &SimplifiedGeometry,
+    patches: &Patches,
+    reach: f32,
+) -> Vec<[bool; 2]> {
     let numbers = 0..patches.len() as u32;
     let extents: Vec<Extent> = numbers.clone().into_par_iter().map(|p| extent(geometry, patches, p)).collect();
     let grid = Grid::new(&extents);
