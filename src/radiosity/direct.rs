@@ -13,16 +13,16 @@ use crate::sampling;
 use crate::shading::SurfacePoint;
 
 /// Samples a side gets before it is known how much it varies ...
-const PILOT: u32 = 4;
+const PILOT: u32 = 8;
 /// ... once more where none of them found light ...
-const PILOT_DARK: u32 = 8;
+const PILOT_DARK: u32 = 16;
 /// ... and where it hardly matters.
 const PILOT_FAR: u32 = 2;
 /// Fewest samples of a side, and where it hardly matters.
-const LEAST: [u32; 2] = [2, 1];
+const LEAST: [u32; 2] = [4, 1];
 /// Most samples of a side.
 const MOST: u32 = 1 << 14;
-/// Relevance, or share of the mean of area times relevance, below which a side hardly matters.
+/// Relevance below which a side hardly matters.
 const FAR: f64 = 0.05;
 /// Sides looked at by one job.
 const JOB: usize = 64;
@@ -54,13 +54,11 @@ pub(super) fn gather(input: &RadiosityScene<'_>, patches: &Patches, seed: u32, t
     let sides = 2 * patches.len();
     let area = |side: usize| patches.open_area(side as u32);
     let stream = |what: u32| sampling::hash_all(&[seed, 0x00d1_9ec7, what]);
-    let weighted = |side: usize| area(side) * patches.relevance[side / 2];
-    let mean = (0..sides).map(weighted).sum::<f64>() / sides as f64;
-    let far = |side: usize| patches.relevance[side / 2] < FAR || weighted(side) < FAR * mean;
+    let far = |side: usize| patches.relevance[side / 2] < FAR;
     let pilot_counts: Vec<u32> = (0..sides).map(|s| if far(s) { PILOT_FAR } else { PILOT }).collect();
     let mut pilot = estimate(input, patches, &pilot_counts, stream(2));
     let mut pilot_rays: u64 = pilot.iter().map(|e| e.rays).sum();
-    // Where half of the samples choose a light source behind the side, all four do so on one side in 16, which would then get the fewest
+    // Where half of the samples choose a light source behind the side, all eight do so on one side in 256, which would then get the fewest
     // samples: what looks dark is looked at again.
     let again = |side: usize| if pilot[side].mean == DVec3::ZERO && !far(side) { PILOT_DARK } else { 0 };
     let again: Vec<u32> = (0..sides).map(again).collect();
@@ -71,6 +69,7 @@ pub(super) fn gather(input: &RadiosityScene<'_>, patches: &Patches, seed: u32, t
         }
     }
     // Sum of standard errors is least for samples in proportion to (A sigma)^(2/3).
+    let weighted = |side: usize| area(side) * patches.relevance[side / 2];
     let spread: Vec<f64> = pilot.iter().enumerate().map(|(s, e)| weighted(s) * e.variance.sqrt()).collect();
     let flux: f64 = pilot.iter().enumerate().map(|(s, e)| weighted(s) * e.mean.element_sum()).sum();
     let weight: f64 = spread.iter().map(|x| x.cbrt().powi(2)).sum();

@@ -156,8 +156,6 @@ const FIRST_RAYS_OF_FEW: f64 = 16.0;
 const FEW_RAYS: f64 = 65536.0;
 /// Fewest rays that the light of the first bounce is shot with.
 const LEAST_RAYS: u64 = 1 << 13;
-/// Share of the error asked for that is left to direct light; it adds to the rest by squares.
-const ERROR_OF_DIRECT: f64 = 0.7;
 /// Solutions that may be averaged to reach the error.
 const MAX_ROUNDS: u32 = 4;
 
@@ -228,10 +226,7 @@ impl Average {
     fn solve(&mut self, tracer: &Tracer<'_>, params: &RadiosityParams, progress: &Progress) -> Result<()> {
         let target = f64::from(params.error);
         let direct = match params.direct {
-            DirectLight::Gather => Some({
-                let target = ERROR_OF_DIRECT * target;
-                direct::gather(tracer.input, tracer.patches, params.seed, target)
-            }),
+            DirectLight::Gather => Some(direct::gather(tracer.input, tracer.patches, params.seed, 0.5 * target)),
             DirectLight::Shoot => None,
         };
         self.rays += direct.as_ref().map_or(0, |d| d.rays);
