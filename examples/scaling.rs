@@ -32,6 +32,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         region: None,
         min_trials: TRIALS,
         max_trials: TRIALS,
+        error: f32::INFINITY,
         hires_error: 0.05,
         lores_error: 0.05,
         time_limit: None,
