@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::str::FromStr;
+use std::sync::Arc;
 use std::time::Duration;
 
 use clap::Args;
@@ -18,6 +19,7 @@ use crate::image::Metadata;
 use crate::pipeline::identity::identity;
 use crate::pipeline::{Method, Prepared, Stats, choose_camera_among};
 use crate::progress::Progress;
+use crate::render::checkpoint::LateIdentity;
 use crate::render::layers::{Layer, develop};
 use crate::render::{Region, RenderParams, Rendering, Session, World, bias};
 use crate::scene::{Camera, Scene};
@@ -224,12 +226,14 @@ impl Options {
     /// Where the rendering of a view is kept while it is not finished; `cameras` are those that the scene is prepared for.
     pub(super) fn keep(
         &self,
-        scene: &Scene,
+        scene: &Arc<Scene>,
         cameras: &[Camera],
         view: &View,
         params: &RenderParams,
     ) -> Result<Option<Checkpoint>> {
-        let identity = || identity(scene, cameras, &view.camera, &self.method.settings(), params);
+        let (scene, settings, params) = (Arc::clone(scene), self.method.settings(), params.clone());
+        let (cameras, camera) = (cameras.to_vec(), view.camera.clone());
+        let identity = LateIdentity::new(move || identity(&scene, &cameras, &camera, &settings, &params));
         self.long.keep(&view.outputs[0], view.checkpoint.as_deref(), identity)
     }
 
