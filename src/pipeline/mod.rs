@@ -206,7 +206,9 @@ pub fn simplify_only(
         settings = automatic(scene, std::slice::from_ref(camera), settings)?;
     }
     let mut kept = Kept::open(&settings, scene, backend.as_ref())?;
+    let start = Stopwatch::start();
     let simplified = kept.simplify(scene, backend.as_ref(), &settings.simplify_params(), progress)?;
+    stats.record_time(start, |s| &mut s.simplify);
     stats.cache = kept.used();
     stats.record_simplified(&simplified);
     Ok((simplified, settings))

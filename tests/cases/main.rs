@@ -26,19 +26,12 @@ use report::{Case, Outcome, Row, table};
 type Recipe = fn(&Case, &mut Outcome<'_>);
 
 /// Cases that are known to fail, with the reason.
-const KNOWN: &[(&str, &str)] = &[
-    (
-        "GSII-014",
-        "only with the paper's box fit, which is not the default, and inherent in it: light from light sources is stopped by the clutter \
-         itself, reflected light comes from its boxes, and the paper's intercept about the square of the share that the clutter does; \
-         see the note",
-    ),
-    (
-        "GSII-015",
-        "the row of blocks is longer than a cluster may be and becomes 20 of them; where a cluster has a block's sides but not its front, \
-         its box is smaller than the blocks (0.38 x 0.19 x 0.38 for 0.4 x 0.2 x 0.4), and 1 to 2 % of the light finds the gaps",
-    ),
-];
+const KNOWN: &[(&str, &str)] = &[(
+    "GSII-014",
+    "only with the paper's box fit, which is not the default, and inherent in it: light from light sources is stopped by the clutter \
+     itself, reflected light comes from its boxes, and the paper's intercept about the square of the share that the clutter does; \
+     see the note",
+)];
 
 fn recipe(id: &str) -> Option<Recipe> {
     let all = [
