@@ -1,10 +1,9 @@
 //! Real and hostile glTF files, where they are at hand: `../shared/scenes` beside the project.
 
-mod common;
-
 use std::path::PathBuf;
 use std::time::Instant;
 
+use crate::common;
 use gsii::scene::{LoadOptions, Scene, load};
 use serde::Deserialize;
 

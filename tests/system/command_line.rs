@@ -1,11 +1,10 @@
 //! The program as a user meets it: exit codes, messages, files.
 
-mod common;
-
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
+use crate::common;
 use gsii::image::{self, Value};
 
 /// A folder with a small scene.
@@ -124,6 +123,43 @@ fn options_that_make_no_sense_are_refused() {
     assert_eq!(bench.files(), before);
     assert!(bench.gsii(&["--help"]).status.success());
     assert!(bench.gsii(&["--version"]).status.success());
+}
+
+/// Scripts depend on these options: they stay, with these names and values.
+#[test]
+fn every_promised_option_works() {
+    let bench = Bench::new();
+    let size = ["render", "room.gltf", "-o", "a.exr", "--width", "12", "--height", "8", "--measure-bias", "64"];
+    for (arguments, key, value) in [
+        ("--camera eye --seed 3 --threads 1 --error 0.5 --min-trials 2 --max-trials 4 --verbose", "camera", "eye"),
+        ("--camera 0 --hires-error 0.5 --lores-error 0.25 --spp 2 --stats b.json", "", ""),
+        ("--camera 0 --hires-error 0.5 --lores-error 0.25 --max-trials 16 --quiet", "lores_error", "0.25"),
+        ("--method gsii --r-thresh 0.5 --beta 0.05 --box paper1993 --spp 2", "r_thresh", "0.5"),
+        ("--method gsii --r-thresh auto --patch-size auto --box flux --spp 2", "box", "flux"),
+        ("--method pmm --unshot 0.1 --patch-size 1.5 --spp 2", "patch_size", "1.5"),
+        ("--method mcpt --max-depth 3 --backend obvhs --spp 2", "backend", "obvhs"),
+        ("--method radiosity --geometry nc", "geometry", "nc"),
+        (
+            "--method radiosity --geometry ns --layers hires,lores,hires_dev,lores_dev,albedo,normal,depth,trials",
+            "geometry",
+            "ns",
+        ),
+        ("--unbiased --spp 2 --exposure 1.5 --time-limit 600", "method", "gsii"),
+    ] {
+        let arguments: Vec<&str> = arguments.split(' ').collect();
+        let output = bench.gsii(&[&size[..], &["--stats", "a.json"], &arguments].concat());
+        if key.is_empty() {
+            assert_eq!(output.status.code(), Some(2), "fixed sampling aims for no error: {arguments:?}");
+            continue;
+        }
+        assert!(output.status.success(), "{arguments:?}: {}", stderr(&output));
+        let stats: serde_json::Value = serde_json::from_slice(&std::fs::read(bench.path("a.json")).unwrap()).unwrap();
+        let used = &stats["parameters"][key];
+        assert!(used == value || used.to_string() == value, "{arguments:?}: {key} is {used}");
+    }
+    bench.render(&["-o", "unbiased.exr", "--unbiased"]);
+    bench.render(&["-o", "traced.exr", "--method", "mcpt"]);
+    assert_eq!(image::read(&bench.path("unbiased.exr")).unwrap(), image::read(&bench.path("traced.exr")).unwrap());
 }
 
 #[test]

@@ -3,12 +3,11 @@
 //! Statistical tests use fixed seeds: they give the same answer every time. The stated false-alarm rate is the chance with which
 //! another seed would fail although nothing is wrong.
 
-mod common;
-
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use common::{
+use crate::common;
+use crate::common::{
     Estimate, cluttered_room, fixed, gltf, interpolated, lit_room, prepare, render, scene, threshold, values,
 };
 use gsii::pipeline::{BackendKind, Method, Settings};

@@ -12,9 +12,9 @@ use gsii::render::{RenderParams, render};
 use gsii::sampling::{hash_all, uniform_sphere, unit};
 use gsii::shading::SurfacePoint;
 
+use super::scenes::*;
+use super::{fixed, range};
 use crate::kit::*;
-use crate::scenes::*;
-use crate::{fixed, range};
 
 /// A triangle whose coordinates spread over 16 decades.
 fn wild_triangle(seed: u32) -> [Vec3; 3] {
