@@ -43,7 +43,7 @@ fn the_number_of_threads_does_not_change_a_bit() {
 
 #[test]
 fn seeds_make_different_images() {
-    for method in [Method::Gsii, Method::Mcpt] {
+    for method in [Method::Gsii, Method::Pmm, Method::Mcpt, Method::Radiosity] {
         let of = |seed| bits(&image(Settings { seed, ..with(method) }, &fixed(24, 16, 4, seed)));
         assert_ne!(of(0), of(1), "{method:?}");
     }
