@@ -5,8 +5,7 @@
 
 use std::sync::Arc;
 
-use crate::common;
-use crate::common::{Body, EYE, Estimate, cluttered_room, fixed, gltf, prepare, render, threshold, values};
+use crate::common::{self, Body, EYE, Estimate, cluttered_room, fixed, gltf, prepare, render, threshold, values};
 use glam::Vec3;
 use gsii::pipeline::{Method, Settings};
 use gsii::render::{RenderParams, bias, show::show_radiosity};

@@ -6,9 +6,8 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use crate::common;
 use crate::common::{
-    Estimate, cluttered_room, fixed, gltf, interpolated, lit_room, prepare, render, scene, threshold, values,
+    self, Estimate, cluttered_room, fixed, gltf, interpolated, lit_room, prepare, render, scene, threshold, values,
 };
 use gsii::pipeline::{BackendKind, Method, Settings};
 use gsii::render::{RenderParams, World, bias};
