@@ -259,7 +259,8 @@ impl Tracer<'_> {
             weight *= if front { squared } else { 1.0 / squared };
         }
         // What the patch takes for diffuse reflection cannot go on as well.
-        let weight = weight.min(Vec3::ONE - self.optics.reflectance[patch as usize]).max(Vec3::ZERO);
+        let weight = weight.min(Vec3::ONE - self.optics.reflectance[patch as usize]).max(Vec3::ZERO)
+            * point.absorption(scene, -direction, hit.t);
         let survival = (weight.max_element() / ROULETTE).min(1.0);
         if random() >= survival {
             return None;

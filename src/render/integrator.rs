@@ -49,6 +49,13 @@ const CERTAIN_DEPTH: u32 = 32;
 /// path alive: between walls of 0.99, a smaller one makes rare paths arbitrarily bright.
 const CERTAIN_SURVIVAL: f32 = 0.999;
 
+/// Share of a pixel over which textures are averaged: its trials average the rest.
+const PIXEL_FOOTPRINT: f32 = 0.5;
+
+/// Width of what a gather ray stands for per distance, for textures: those of a hemisphere are a tenth apart. Path tracing, which
+/// is to be exact, reads them at the point.
+const GATHER_FOOTPRINT: f32 = 0.05;
+
 /// Points that are shaded together: as many as stay close to the processor.
 const MET_AT_ONCE: usize = 256;
 
@@ -152,7 +159,7 @@ impl<'a> World<'a> {
         let trials = batch.pixels.len() * batch.trials as usize;
         ws.start(trials);
         let view = ViewRays::new(camera, image_size, batch.seed);
-        ws.pixel = view.unit_footprint();
+        ws.cone = view.cone();
         for (place, &pixel) in (0..).zip(batch.pixels) {
             ws.paths.extend(view.paths(tile.pixel(pixel), batch.first, batch.trials, place * batch.trials));
         }
@@ -371,7 +378,12 @@ impl<'a> World<'a> {
         capture: &mut Option<&mut Vec<Captured>>,
     ) {
         let path = &ws.paths[index as usize];
-        let point = SurfacePoint::new(self.scene, hit);
+        let mut point = SurfacePoint::new(self.scene, hit);
+        point.footprint = match (path.gathers, self.far) {
+            (false, _) => PIXEL_FOOTPRINT * (ws.cone[0] + ws.cone[1] * hit.t),
+            (true, Some(_)) => GATHER_FOOTPRINT * hit.t,
+            (true, None) => 0.0,
+        };
         let wanted = if path.gathers { passes.lores } else { passes.hires };
         let lit = look_up.is_none() && wanted && path.depth < self.max_depth && !self.lights.is_empty();
         if lit {
@@ -410,9 +422,10 @@ impl<'a> World<'a> {
         capture: &mut Option<&mut Vec<Captured>>,
     ) {
         let &Met { ref hit, look_up, ref point, .. } = met;
-        let path = ws.paths[met.path as usize];
+        let mut path = ws.paths[met.path as usize];
         let trial = path.trial as usize;
         let outgoing = -path.ray.direction;
+        path.throughput *= point.absorption(self.scene, outgoing, hit.t);
         let facing = point.shading_normal_towards(outgoing);
         let lobes = match look_up {
             // The radiosity solution reflects everything diffusely that is no perfect mirror.
@@ -454,7 +467,7 @@ impl<'a> World<'a> {
             && let Some(cache) = self.cache
             && let diffuse = bsdf.albedo_diffuse()
             && diffuse != Vec3::ZERO
-            && let Some(light) = cache.look_up(&mut ws.nearby, ws.pixel * hit.t, point.position, facing)
+            && let Some(light) = cache.look_up(&mut ws.nearby, ws.cone[0] + ws.cone[1] * hit.t, point.position, facing)
         {
             ws.lores[trial] += path.throughput * diffuse * light;
             low = bsdf.albedo_rough();

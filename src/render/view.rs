@@ -25,9 +25,9 @@ impl ViewRays {
         self.lens.footprint(position, self.size[1])
     }
 
-    /// Width of a pixel at unit distance from the camera, scene units.
-    pub fn unit_footprint(&self) -> f32 {
-        self.lens.unit_footprint(self.size[1])
+    /// Width of a pixel at the start of its rays and its growth over distance, scene units.
+    pub fn cone(&self) -> [f32; 2] {
+        self.lens.cone(self.size[1])
     }
 
     /// Trial `number` of a pixel (column, row); `trial` is the path's place in its batch.

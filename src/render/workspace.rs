@@ -36,8 +36,8 @@ pub struct Workspace {
     pub(super) distances: Vec<f32>,
     /// What the irradiance cache says around the points of this batch.
     pub(super) nearby: Nearby,
-    /// Width of a pixel at unit distance, scene units.
-    pub(super) pixel: f32,
+    /// Width of a pixel at the start of view rays and its growth over distance; zero reads textures at their full resolution.
+    pub(super) cone: [f32; 2],
     /// Rays traced since this was last reset.
     pub counts: RayCounts,
     /// Time spent since this was last reset.
@@ -80,6 +80,7 @@ impl Workspace {
         self.features.clear();
         self.distances.clear();
         self.nearby.clear();
+        self.cone = [0.0; 2];
         for sums in [&mut self.hires, &mut self.lores] {
             sums.clear();
             sums.resize(trials, Vec3::ZERO);

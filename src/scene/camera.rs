@@ -73,13 +73,14 @@ pub struct Lens {
 impl Lens {
     /// Width of the `rows`th part of the film's height as seen at `position`, scene units.
     pub fn footprint(&self, position: Vec3, rows: u32) -> f32 {
-        let width = self.unit_footprint(rows);
-        if self.central { width * position.distance(self.position) } else { width }
+        let [start, growth] = self.cone(rows);
+        start + growth * position.distance(self.position)
     }
 
-    /// The same at unit distance from the camera.
-    pub fn unit_footprint(&self, rows: u32) -> f32 {
-        2.0 * self.up.length() / rows as f32
+    /// The same along a ray: at its start, and its growth over distance.
+    pub fn cone(&self, rows: u32) -> [f32; 2] {
+        let height = 2.0 * self.up.length() / rows as f32;
+        if self.central { [0.0, height] } else { [height, 0.0] }
     }
 
     /// The ray through `film`, 0..1 in both axes, from the top left.

@@ -164,6 +164,15 @@ fn every_promised_option_works() {
 }
 
 #[test]
+fn a_scene_without_light_is_noticed() {
+    let bench = Bench::new();
+    let dark = common::gltf(&common::cluttered_room(0.5, 0.0, 0.5), common::EYE);
+    std::fs::write(bench.path("room.gltf"), dark).unwrap();
+    assert!(stderr(&bench.render(&["-o", "out.png"])).contains("nothing gives light"));
+    assert!(!stderr(&bench.render(&["-o", "out.png", "--sky"])).contains("nothing gives light"));
+}
+
+#[test]
 fn places_that_cannot_be_written_are_noticed_before_the_work() {
     let bench = Bench::new();
     std::fs::create_dir(bench.path("there.exr")).unwrap();

@@ -3,6 +3,10 @@
 //! Statistical tests use fixed seeds: they give the same answer every time. The stated false-alarm rate is the chance with which
 //! another seed would fail although nothing is wrong.
 
+#[allow(dead_code, reason = "its main is not needed")]
+#[path = "../../examples/library.rs"]
+mod library;
+
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -25,6 +29,17 @@ fn bits(values: &[f64]) -> Vec<u64> {
 fn image(settings: Settings, params: &RenderParams) -> Vec<f64> {
     let (prepared, _) = prepare(&scene(&lit_room()), settings);
     values(&render(&prepared, params).film)
+}
+
+#[test]
+fn the_example_of_the_documentation_renders() {
+    let folder = tempfile::tempdir().unwrap();
+    let [file, picture] = ["room.gltf", "room.exr"].map(|name| folder.path().join(name));
+    std::fs::write(&file, lit_room()).unwrap();
+    library::render(&file, &picture, 24, 16).unwrap();
+    let image = gsii::image::read(&picture).unwrap();
+    assert_eq!((image.width(), image.height()), (24, 16));
+    assert!(image.channel("depth.Z").unwrap().iter().all(|&depth| depth > 0.0), "the room is closed");
 }
 
 #[test]
