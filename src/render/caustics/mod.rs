@@ -23,6 +23,7 @@ mod targets;
 mod tests;
 mod trace;
 
+use std::f32::consts::FRAC_1_PI;
 use std::sync::Arc;
 
 use glam::Vec3;
@@ -43,6 +44,12 @@ const SMALL: f64 = 0.03;
 
 /// Roughness below which reflection is a delta function.
 const SMOOTH: f32 = 0.01;
+
+/// Cosine between shading and geometric normal from which on a surface is taken to be flat.
+const FLAT: f32 = 0.999;
+
+/// Share of rough reflection in the albedo up to which it is taken to be diffuse.
+const WEAK: f32 = 0.1;
 
 /// Keeps the photons' random numbers apart from all others.
 const STREAM: u32 = 0x7068_6f74;
@@ -141,9 +148,14 @@ impl Caustics {
             let low = weak.eval_low(toward);
             if glossy { low + bsdf.eval_high(toward).0 } else { low }
         };
+        // Weak reflection of a coat goes with the diffuse, as in the irradiance cache.
+        let (albedo, rough) = (weak.albedo_low(), weak.albedo_rough());
+        let flat = point.shading_normal.dot(point.geometric_normal) > FLAT;
+        let even = flat && !glossy && rough.max_element() <= WEAK * albedo.max_element();
+        let diffuse = even.then_some(albedo * FRAC_1_PI);
         let front = outgoing.dot(point.geometric_normal) >= 0.0;
         let normal = if front { point.geometric_normal } else { -point.geometric_normal };
-        let of = |map: &PhotonMap| map.radiance(point.position, normal, &scatter);
+        let of = |map: &PhotonMap| map.radiance(point.position, normal, diffuse, &scatter);
         of(&self.of_areas) + of(&self.of_points)
     }
 }
