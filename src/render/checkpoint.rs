@@ -301,6 +301,7 @@ mod tests {
             region: Some(Region { low: [0, 0], high: [8, 2] }),
             min_trials: 4,
             max_trials: 64,
+            error: 0.1,
             hires_error: 0.1,
             lores_error: 0.1,
             time_limit: None,

@@ -156,6 +156,7 @@ impl<'a> World<'a> {
         let trials = batch.pixels.len() * batch.trials as usize;
         ws.start(trials);
         let view = ViewRays::new(camera, image_size, batch.seed);
+        ws.pixel = view.unit_footprint();
         for (place, &pixel) in (0..).zip(batch.pixels) {
             ws.paths.extend(view.paths(tile.pixel(pixel), batch.first, batch.trials, place * batch.trials));
         }
@@ -463,7 +464,7 @@ impl<'a> World<'a> {
             && let Some(cache) = self.cache
             && let diffuse = bsdf.albedo_diffuse()
             && diffuse != Vec3::ZERO
-            && let Some(light) = cache.look_up(point.position, facing)
+            && let Some(light) = cache.look_up(&mut ws.nearby, ws.pixel * hit.t, point.position, facing)
         {
             ws.lores[trial] += path.throughput * diffuse * light;
             low = bsdf.albedo_rough();

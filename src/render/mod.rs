@@ -58,6 +58,9 @@ pub struct RenderParams {
     pub min_trials: u32,
     /// Most trials of a pixel in each pass; equal to `min_trials` for fixed sampling.
     pub max_trials: u32,
+    /// Relative standard error of the image that trials are planned for: the root of the mean over pixels of its square. Infinite for
+    /// none.
+    pub error: f32,
     /// Relative standard error of a pixel at which HIRES stops.
     pub hires_error: f32,
     /// Relative standard error of a pixel, both passes together, at which LORES stops.

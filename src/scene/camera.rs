@@ -73,8 +73,13 @@ pub struct Lens {
 impl Lens {
     /// Width of the `rows`th part of the film's height as seen at `position`, scene units.
     pub fn footprint(&self, position: Vec3, rows: u32) -> f32 {
-        let height = 2.0 * self.up.length() / rows as f32;
-        if self.central { height * position.distance(self.position) } else { height }
+        let width = self.unit_footprint(rows);
+        if self.central { width * position.distance(self.position) } else { width }
+    }
+
+    /// The same at unit distance from the camera.
+    pub fn unit_footprint(&self, rows: u32) -> f32 {
+        2.0 * self.up.length() / rows as f32
     }
 
     /// The ray through `film`, 0..1 in both axes, from the top left.

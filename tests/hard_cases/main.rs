@@ -26,6 +26,7 @@ fn fixed([width, height]: [u32; 2], trials: u32) -> RenderParams {
         max_trials: trials,
         interpolate: false,
         region: None,
+        error: f32::INFINITY,
         hires_error: 1.0,
         lores_error: 1.0,
         time_limit: None,

@@ -8,6 +8,7 @@
 mod clamp;
 mod flight;
 mod index;
+mod nearby;
 mod record;
 
 use glam::Vec3;
@@ -19,10 +20,11 @@ use super::path::{Arrival, Path};
 use super::view::ViewRays;
 use super::workspace::Workspace;
 use crate::backend::Ray;
-use crate::sampling::{hash_all, sobol};
+use crate::sampling::{basis, hash_all, sobol};
 use crate::scene::Camera;
 use clamp::clamped_distances;
 use index::Index;
+pub use nearby::Nearby;
 use record::{Record, Strata};
 
 /// Pass after pass: the distance in pixels of the places that are looked at, and the rays of a record. Records that are close
@@ -197,18 +199,10 @@ impl IrradianceCache {
         self.records.is_empty()
     }
 
-    /// Irradiance over pi at a point with shading normal `normal`; `None` where no record reaches, or most refuse.
-    pub fn look_up(&self, position: Vec3, normal: Vec3) -> Option<Vec3> {
-        let (mut sum, mut weights, mut refused) = (Vec3::ZERO, 0.0, 0.0);
-        for (weight, record) in self.around(position, normal) {
-            if record.refuses {
-                refused += weight;
-            } else {
-                sum += weight * record.at(position, normal);
-                weights += weight;
-            }
-        }
-        (weights > refused).then(|| sum / weights)
+    /// Irradiance over pi at a point with shading normal `normal` that is seen with pixels of the width `pixel` (which only decides how
+    /// much is kept in `nearby`); `None` where no record reaches, or most refuse.
+    pub fn look_up(&self, nearby: &mut Nearby, pixel: f32, position: Vec3, normal: Vec3) -> Option<Vec3> {
+        nearby.around(&self.index, &self.records, pixel, position)?.look_up(position, normal)
     }
 
     /// Asks the others what each record measured itself. Records that are told something else refuse.
@@ -250,12 +244,13 @@ fn gather(
     stream: u32,
 ) -> Option<Record> {
     let Captured { point, normal, .. } = &place.captured;
+    let frame = basis(*normal);
     let paths: Vec<Path> = (0..strata.len())
         .map(|k| {
-            let direction = strata.direction(*normal, k, stream);
-            let [.., u, _] = sobol(k as u32, 0, stream);
+            let [u, v, near, _] = sobol(k as u32, 0, stream);
+            let direction = strata.direction(&frame, k, [u, v]);
             Path {
-                near: far.r_thresh * (0.5 + u),
+                near: far.r_thresh * (0.5 + near),
                 arrival: Arrival::Soft,
                 gathers: true,
                 depth: 1,

@@ -5,7 +5,7 @@ use std::f32::consts::{FRAC_1_PI, TAU};
 use glam::{Mat3, Vec3};
 use serde::{Deserialize, Serialize};
 
-use crate::sampling::{basis, sobol};
+use crate::sampling::basis;
 
 /// Strata of the hemisphere: rings of equal projected solid angle, cut into sectors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,27 +20,25 @@ impl Strata {
         self.rings * self.sectors
     }
 
-    /// The direction of ray `k` (ring by ring) of the record of `stream` around `normal`, cosine-distributed in its stratum.
-    pub fn direction(self, normal: Vec3, k: usize, stream: u32) -> Vec3 {
-        let u = sobol(k as u32, 0, stream);
+    /// The direction of ray `k` (ring by ring) around the third axis of `frame`, cosine-distributed in its stratum; `u` uniform in 0..1.
+    pub fn direction(self, frame: &Mat3, k: usize, u: [f32; 2]) -> Vec3 {
         let (ring, sector) = (k / self.sectors, k % self.sectors);
         let sin2 = (ring as f32 + u[0]) / self.rings as f32;
-        let phi = TAU * (sector as f32 + u[1]) / self.sectors as f32;
-        let (sin, cos) = phi.sin_cos();
+        let (sin, cos) = (TAU * (sector as f32 + u[1]) / self.sectors as f32).sin_cos();
         let radius = sin2.sqrt();
-        basis(normal) * Vec3::new(radius * cos, radius * sin, (1.0 - sin2).max(0.0).sqrt())
+        *frame * Vec3::new(radius * cos, radius * sin, (1.0 - sin2).max(0.0).sqrt())
     }
 }
 
 /// Largest angle between normals over which a record is used: 20 degrees, as the cosine.
-const LEAST_COSINE: f32 = 0.939_692_6;
+pub(super) const LEAST_COSINE: f32 = 0.939_692_6;
 
 /// Largest change that gradients may make, as a share of the record's own light.
-const MOST_CHANGE: f32 = 0.5;
+pub(super) const MOST_CHANGE: f32 = 0.5;
 
 /// A point may lie this far in front of a record's tangent plane, as a share of the record's reach, before the record is taken to
 /// see what the point does not (Ward 1988, section 2.2).
-const IN_FRONT: f32 = 0.1;
+pub(super) const IN_FRONT: f32 = 0.1;
 
 /// Indirect light at one point of a surface, and how it changes around it.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
@@ -59,9 +57,9 @@ pub(super) struct Record {
     /// Irradiance over pi: the radiance that a white diffuse surface reflects, W/(sr m^2).
     pub radiance: Vec3,
     /// Change of each band with the normal: scalar product with the axis of rotation times its sine.
-    by_rotation: [Vec3; 3],
+    pub by_rotation: [Vec3; 3],
     /// Change of each band with the position.
-    by_translation: [Vec3; 3],
+    pub by_translation: [Vec3; 3],
 }
 
 impl Record {
@@ -181,13 +179,16 @@ impl Record {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sampling::sobol;
 
     /// A record at `position` in a world where a ray brings what `radiance` says of its origin and direction, from a distance.
     fn record(position: Vec3, normal: Vec3, stream: u32, world: &dyn Fn(Vec3, Vec3) -> (f32, f32)) -> Record {
         let strata = Strata { rings: 16, sectors: 48 };
+        let frame = basis(normal);
         let (radiance, distances): (Vec<Vec3>, Vec<f32>) = (0..strata.len())
             .map(|k| {
-                let (l, d) = world(position, strata.direction(normal, k, stream));
+                let [u, v, ..] = sobol(k as u32, 0, stream);
+                let (l, d) = world(position, strata.direction(&frame, k, [u, v]));
                 (Vec3::splat(l), d)
             })
             .unzip();
