@@ -2,6 +2,7 @@
 
 pub mod bias;
 pub mod cache;
+pub mod caustics;
 pub mod checkpoint;
 pub mod film;
 pub mod integrator;
@@ -21,6 +22,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 pub use cache::IrradianceCache;
+pub use caustics::Caustics;
 pub use film::{Film, Region};
 pub use integrator::{FarField, World};
 pub use nearness::Nearness;

@@ -12,6 +12,7 @@ mod hard_cases;
 #[path = "../cases/kit.rs"]
 mod kit;
 mod long;
+mod materials;
 mod parts;
 mod references;
 mod rendering;
