@@ -18,7 +18,6 @@ readonly WHEEL_SHA256=ddc6887b38cc742a9ada3b04ce6157ce321c67325bfd9b758854ee0eab
 readonly HEADERS=libembree-dev=4.3.3+dfsg-1
 readonly HEADERS_SHA256=674a8b3d1a00612f46730da29f4cc146267b4917bbf0242113d0568429e78726
 readonly HEADERS_SUITE=trixie
-readonly FALLBACK_MIRROR=http://deb.debian.org/debian
 
 export DEBIAN_FRONTEND=noninteractive LC_ALL=C.UTF-8
 
@@ -70,10 +69,9 @@ embree_ready() {
 
 check_sum() { printf '%s  %s\n' "$2" "$1" | sha256sum --check --status; }
 
-# Debian archives this machine already uses, then the public one.
+# Debian archives that this machine uses.
 mirrors() {
     apt-get indextargets --format '$(REPO_URI)' 'Created-By: Packages' 'Origin: Debian' 'Label: Debian' 2>/dev/null || true
-    printf '%s\n' "$FALLBACK_MIRROR"
 }
 
 fetch_headers() (
@@ -109,7 +107,7 @@ install_embree_locally() {
     trap "rm -rf '$tmp'" EXIT
 
     say "fetching Embree 4 headers ($HEADERS)"
-    fetch_headers "$tmp/apt" || die "cannot get $HEADERS with its expected SHA-256 sum from any Debian mirror"
+    fetch_headers "$tmp/apt" || die "none of this machine's Debian package sources has $HEADERS with its expected SHA-256 sum (suite $HEADERS_SUITE): add one that has to /etc/apt/sources.list, or build Embree 4.3 or newer yourself and set EMBREE_DIR to where it is installed"
     say "fetching the Embree 4 library ($WHEEL)"
     # The library inside does not depend on Python; naming one Python gives every machine the same file.
     python3 -m pip download --quiet --no-deps --only-binary=:all: --implementation cp --python-version 3.11 --abi cp311 \

@@ -5,6 +5,12 @@
 //!
 //! Data flows one way: [`scene`] is simplified ([`simplify`]), solved ([`radiosity`]), rendered
 //! ([`render`]) and written ([`image`]); ray queries of every stage go through [`backend`].
+//!
+//! # Example
+//!
+//! ```no_run
+#![doc = include_str!("../examples/library.rs")]
+//! ```
 
 pub mod backend;
 pub mod cli;

@@ -79,13 +79,20 @@ pub struct OutsideOptions {
 }
 
 impl OutsideOptions {
-    /// Puts a scene where the options say.
+    /// Puts a scene where the options say, and warns when no light comes from anywhere.
     ///
     /// # Errors
     /// An image that cannot be read, values out of range, a sun that is not up.
     pub fn surround(&self, scene: &mut Arc<Scene>) -> Result<()> {
-        let Some(environment) = self.environment(&scene.name)? else { return Ok(()) };
-        Arc::make_mut(scene).environment = Some(Arc::new(environment));
+        if let Some(environment) = self.environment(&scene.name)? {
+            Arc::make_mut(scene).environment = Some(Arc::new(environment));
+        }
+        if scene.is_dark() {
+            log::warn!(
+                "{}: nothing gives light, so the image will be black; --sky or --environment IMAGE light the scene from outside",
+                scene.name
+            );
+        }
         Ok(())
     }
 

@@ -149,6 +149,7 @@ fn pass_panes(
                 return false; // boxes are no panes
             };
             let point = SurfacePoint::new(scene, &Hit { triangle, ..*hit });
+            through[*i] *= point.absorption(scene, -ray.direction, hit.t);
             // The threshold only sorts reflections.
             through[*i] *= Bsdf::new(scene, &point, -ray.direction, Lobes::MIRRORS).straight_transmittance();
             let origin = point.ray_origin(ray.direction);

@@ -25,6 +25,11 @@ impl ViewRays {
         self.lens.footprint(position, self.size[1])
     }
 
+    /// Width of a pixel at the start of its rays and its growth over distance, scene units.
+    pub fn cone(&self) -> [f32; 2] {
+        self.lens.cone(self.size[1])
+    }
+
     /// Trial `number` of a pixel (column, row); `trial` is the path's place in its batch.
     pub fn path(&self, pixel: [u32; 2], number: u32, trial: u32) -> Path {
         self.path_in(self.stream(pixel, number & 1), pixel, number >> 1, trial)

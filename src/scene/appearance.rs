@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3, Vec4};
 
-use super::{Alpha, Material, Scene, TextureSlot};
+use super::{Alpha, Material, Object, Scene, TextureSlot};
 use crate::sampling;
 
 /// Texels that one sample of [`Scene::mean_reflectance`] stands for, and bounds of the number of samples.
@@ -11,6 +11,12 @@ const MIN_SAMPLES: u32 = 4;
 const MAX_SAMPLES: u32 = 256;
 
 impl Scene {
+    /// Whether nothing gives light: no surface, no light without area, nothing around.
+    pub fn is_dark(&self) -> bool {
+        let emits = |object: &Object| self.materials[object.material as usize].is_emitter();
+        self.lights.is_empty() && self.environment.is_none() && !self.mesh.objects.iter().any(emits)
+    }
+
     /// The material of a triangle.
     pub fn material(&self, triangle: u32) -> &Material {
         &self.materials[self.mesh.object(triangle).material as usize]
@@ -32,6 +38,20 @@ impl Scene {
         self.textures[slot.texture as usize].sample(uv)
     }
 
+    /// The same averaged over about `width` (scene units) around the point.
+    pub fn texture_over(&self, slot: &TextureSlot, triangle: u32, u: f32, v: f32, width: f32) -> Vec4 {
+        let texture = &self.textures[slot.texture as usize];
+        if width == 0.0 || texture.smaller.is_empty() {
+            return self.texture(slot, triangle, u, v);
+        }
+        let corner = |u, v| slot.transform.transform_point2(self.uv(slot.uv_set, triangle, u, v));
+        let (a, b, c) = (corner(0.0, 0.0), corner(1.0, 0.0), corner(0.0, 1.0));
+        let [p, q, r] = self.mesh.corners(triangle);
+        let texels = (b - a).perp_dot(c - a).abs() * texture.width as f32 * texture.height as f32;
+        let area = (q - p).cross(r - p).length();
+        texture.sample_over(a + u * (b - a) + v * (c - a), width * (texels / area).sqrt())
+    }
+
     /// Linear RGBA of the vertex colours at a point; white without any.
     pub fn vertex_color(&self, triangle: u32, u: f32, v: f32) -> Vec4 {
         if self.mesh.colors.is_empty() {
@@ -43,23 +63,30 @@ impl Scene {
     }
 
     /// Factor, texture and vertex colour multiplied: colour and alpha, each 0..=1.
-    fn base_rgba(&self, triangle: u32, u: f32, v: f32) -> Vec4 {
+    fn base_rgba(&self, triangle: u32, u: f32, v: f32, width: f32) -> Vec4 {
         let material = self.material(triangle);
         let mut rgba = material.base_color.extend(material.opacity) * self.vertex_color(triangle, u, v);
         if let Some(slot) = &material.base_color_texture {
-            rgba *= self.texture(slot, triangle, u, v);
+            // What is cut out often has another colour, which must not bleed into what is there.
+            let width = if material.alpha == Alpha::Opaque { width } else { 0.0 };
+            rgba *= self.texture_over(slot, triangle, u, v, width);
         }
         rgba.clamp(Vec4::ZERO, Vec4::ONE) // rounding, and float textures beyond 1
     }
 
     /// Base colour at a point, linear, each band 0..=1.
     pub fn base_color(&self, triangle: u32, u: f32, v: f32) -> Vec3 {
-        self.base_rgba(triangle, u, v).truncate()
+        self.base_color_over(triangle, u, v, 0.0)
+    }
+
+    /// The same averaged over about `width` (scene units) around the point.
+    pub fn base_color_over(&self, triangle: u32, u: f32, v: f32, width: f32) -> Vec3 {
+        self.base_rgba(triangle, u, v, width).truncate()
     }
 
     /// Alpha at a point, 0..=1, whatever the material's mode makes of it.
     pub fn alpha(&self, triangle: u32, u: f32, v: f32) -> f32 {
-        self.base_rgba(triangle, u, v).w
+        self.base_rgba(triangle, u, v, 0.0).w
     }
 
     /// Probability that the surface is there at a point: 1 for opaque materials, 0 or 1 for masked, alpha for blended.

@@ -73,8 +73,14 @@ pub struct Lens {
 impl Lens {
     /// Width of the `rows`th part of the film's height as seen at `position`, scene units.
     pub fn footprint(&self, position: Vec3, rows: u32) -> f32 {
+        let [start, growth] = self.cone(rows);
+        start + growth * position.distance(self.position)
+    }
+
+    /// The same along a ray: at its start, and its growth over distance.
+    pub fn cone(&self, rows: u32) -> [f32; 2] {
         let height = 2.0 * self.up.length() / rows as f32;
-        if self.central { height * position.distance(self.position) } else { height }
+        if self.central { [0.0, height] } else { [height, 0.0] }
     }
 
     /// The ray through `film`, 0..1 in both axes, from the top left.

@@ -4,7 +4,7 @@ use glam::{DAffine3, DMat3, DVec3, Mat3, Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::builder::{Instance, MeshData, SceneBuilder, normal_matrix};
-use super::{Aabb, Alpha, Camera, LightKind, Mesh, Object, Projection, PunctualLight, Scene};
+use super::{Aabb, Alpha, Camera, LightKind, Material, Mesh, Object, Projection, PunctualLight, Scene, Texture};
 use super::{clean, overview, pane};
 use crate::backend::PartKind;
 use crate::error::Result;
@@ -31,6 +31,7 @@ pub(super) fn finish(mut builder: SceneBuilder) -> Result<Scene> {
         cameras.push(place_camera(camera, transform, centre).map_err(|e| builder.error(e))?);
     }
     let mut mesh = assemble(&builder, centre);
+    let textures = with_smaller(&builder.materials, builder.textures);
     let emits: Vec<bool> = builder.materials.iter().map(|m| m.is_emitter()).collect();
     clean::clean(&mut mesh, &emits, &mut builder.notes);
     if cameras.is_empty() {
@@ -41,12 +42,24 @@ pub(super) fn finish(mut builder: SceneBuilder) -> Result<Scene> {
         name: builder.name,
         mesh,
         materials: builder.materials,
-        textures: builder.textures,
+        textures,
         lights,
         cameras,
         centre,
         notes: builder.notes,
     })
+}
+
+/// Makes the smaller images of textures that are read with a footprint. Others keep their one: normal maps, whose mean is a smoother
+/// surface, what emits, which light sources are sampled by, and what is cut out.
+fn with_smaller(materials: &[Material], textures: Vec<Texture>) -> Vec<Texture> {
+    let mut wanted = vec![false; textures.len()];
+    for material in materials {
+        for slot in material.filtered_slots() {
+            wanted[slot.texture as usize] = true;
+        }
+    }
+    textures.into_par_iter().zip(wanted).map(|(t, wanted)| if wanted { t.with_smaller() } else { t }).collect()
 }
 
 /// A material whose emission texture is black everywhere is no light source; as one it would cost samples for nothing.

@@ -59,10 +59,16 @@ pub struct Material {
     pub ior: f32,
     /// Strength of the dielectric specular lobe (`KHR_materials_specular`), 0..=1.
     pub specular: f32,
+    /// Alpha multiplies `specular`.
+    pub specular_texture: Option<TextureSlot>,
     /// Colour of the dielectric specular lobe at normal incidence.
     pub specular_color: Vec3,
+    /// Multiplies `specular_color`.
+    pub specular_color_texture: Option<TextureSlot>,
     /// Share of the diffuse lobe replaced by transmission (`KHR_materials_transmission`), 0..=1.
     pub transmission: f32,
+    /// Red multiplies `transmission`.
+    pub transmission_texture: Option<TextureSlot>,
     /// Whether transmitted light refracts (`KHR_materials_volume` with thickness); otherwise it goes straight on.
     pub refracts: bool,
     /// Colour that white light takes on after [`Material::attenuation_distance`] inside.
@@ -92,8 +98,11 @@ impl Default for Material {
             emission_texture: None,
             ior: 1.5,
             specular: 1.0,
+            specular_texture: None,
             specular_color: Vec3::ONE,
+            specular_color_texture: None,
             transmission: 0.0,
+            transmission_texture: None,
             refracts: false,
             attenuation_color: Vec3::ONE,
             attenuation_distance: f32::INFINITY,
@@ -131,6 +140,17 @@ impl Material {
         self.metallic == 0.0 && self.specular == 0.0 && self.transmission == 0.0
     }
 
+    /// Whether light loses some of itself on its way through the inside.
+    pub fn absorbs(&self) -> bool {
+        let tinted = self.attenuation_distance.is_finite() && self.attenuation_color != Vec3::ONE;
+        tinted && self.refracts && self.transmission > 0.0
+    }
+
+    /// Share of light that is left after `distance` on the inside (Beer and Lambert), of a material that [`absorbs`](Self::absorbs).
+    pub fn left_after(&self, distance: f32) -> Vec3 {
+        self.attenuation_color.powf(distance / self.attenuation_distance)
+    }
+
     /// Whether it transmits light without scattering it: glass with a surface as smooth as a mirror's.
     pub fn transmits_smoothly(&self) -> bool {
         self.transmission > 0.0 && self.metallic < 1.0 && self.roughness <= MAX_SMOOTH_ROUGHNESS && !self.is_emitter()
@@ -138,8 +158,28 @@ impl Material {
 
     /// All textures that it reads.
     pub fn texture_slots(&self) -> impl Iterator<Item = &TextureSlot> {
-        let slots =
-            [&self.base_color_texture, &self.metallic_roughness_texture, &self.normal_texture, &self.emission_texture];
+        let slots = [
+            &self.base_color_texture,
+            &self.metallic_roughness_texture,
+            &self.normal_texture,
+            &self.emission_texture,
+            &self.specular_texture,
+            &self.specular_color_texture,
+            &self.transmission_texture,
+        ];
+        slots.into_iter().flatten()
+    }
+
+    /// Those that may be averaged over a footprint.
+    pub(super) fn filtered_slots(&self) -> impl Iterator<Item = &TextureSlot> {
+        let base_color = if self.alpha == Alpha::Opaque { &self.base_color_texture } else { &None };
+        let slots = [
+            base_color,
+            &self.metallic_roughness_texture,
+            &self.specular_texture,
+            &self.specular_color_texture,
+            &self.transmission_texture,
+        ];
         slots.into_iter().flatten()
     }
 

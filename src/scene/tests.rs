@@ -191,7 +191,8 @@ fn objects_are_ordered_by_kind() {
 
 fn checker() -> Texture {
     let texels = [[0, 0, 0, 255], [255, 255, 255, 0], [255, 255, 255, 0], [0, 0, 0, 255]].concat();
-    Texture { name: "checker".into(), width: 2, height: 2, texels: Texels::Linear8(texels), wrap: [Wrap::Repeat; 2] }
+    let (name, wrap) = ("checker".into(), [Wrap::Repeat; 2]);
+    Texture { name, width: 2, height: 2, texels: Texels::Linear8(texels), wrap, smaller: Vec::new() }
 }
 
 fn textured(alpha: Alpha) -> Scene {

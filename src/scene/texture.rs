@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 use glam::{Vec2, Vec4};
 use rayon::prelude::*;
 
-use crate::srgb::srgb_decode;
+use crate::srgb::{srgb_decode, srgb_encode};
 
 /// What texture coordinates outside of 0..1 mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
@@ -32,6 +32,8 @@ pub struct Texture {
     pub texels: Texels,
     /// Meaning of coordinates outside of 0..1, horizontally and vertically.
     pub wrap: [Wrap; 2],
+    /// The same at half the size, a quarter and so on down to one texel, as [`Texture::with_smaller`] makes it; may be empty.
+    pub smaller: Vec<Texture>,
 }
 
 /// Texel storage.
@@ -44,6 +46,30 @@ pub enum Texels {
     /// Linear floats.
     Float(Vec<f32>),
 }
+
+/// A texel along one axis, and its share.
+type Share = (u32, f32);
+
+/// The texels of an axis with `of` of them that texel `i` covers where there are `size`, at least half as many. Shares add up to one.
+fn shares(i: u32, size: u32, of: u32) -> [Share; 3] {
+    // In units of 1 / size of a texel, so that all is exact.
+    let (start, end) = (u64::from(i) * u64::from(of), u64::from(i + 1) * u64::from(of));
+    let first = start / u64::from(size);
+    std::array::from_fn(|k| {
+        let at = first + k as u64;
+        let (low, high) = (at * u64::from(size), (at + 1) * u64::from(size));
+        let covered = high.min(end).saturating_sub(low.max(start));
+        (at.min(u64::from(of) - 1) as u32, covered as f32 / of as f32)
+    })
+}
+
+fn eight_bits(x: f32) -> u8 {
+    (x * 255.0 + 0.5) as u8
+}
+
+/// sRGB-encoded bytes by the square root of the linear value, so finely that rounding is exact within a twelfth of a step.
+static SRGB8_OF_ROOT: LazyLock<[u8; 4096]> =
+    LazyLock::new(|| std::array::from_fn(|i| eight_bits(srgb_encode((i as f32 / 4095.0).powi(2)))));
 
 static SRGB8: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|i| srgb_decode(i as f32 / 255.0)));
 
@@ -105,6 +131,59 @@ impl Texture {
         top.lerp(bottom, fy)
     }
 
+    /// The same averaged over about `width` texels around `uv`: a box of at least half that, and no more.
+    pub fn sample_over(&self, uv: Vec2, width: f32) -> Vec4 {
+        // Saturates: none of what is infinite or no number is an index beyond the end.
+        let level = (width.log2() as usize).min(self.smaller.len());
+        if level == 0 { self.sample(uv) } else { self.smaller[level - 1].sample(uv) }
+    }
+
+    /// Adds smaller images, each the mean of the one before in linear light.
+    pub fn with_smaller(mut self) -> Self {
+        self.smaller.clear();
+        while let largest = self.smaller.last().unwrap_or(&self)
+            && largest.width.max(largest.height) > 1
+        {
+            let half = largest.halved();
+            self.smaller.push(half);
+        }
+        self
+    }
+
+    fn halved(&self) -> Texture {
+        let (width, height) = (self.width.div_ceil(2), self.height.div_ceil(2));
+        let columns: Vec<[Share; 3]> = (0..width).map(|x| shares(x, width, self.width)).collect();
+        let rows: Vec<Vec<Vec4>> = (0..height)
+            .into_par_iter()
+            .map(|y| {
+                let rows = shares(y, height, self.height);
+                let mean = |columns: &[Share; 3]| {
+                    let mut sum = Vec4::ZERO;
+                    for (row, down) in rows {
+                        for &(column, across) in columns {
+                            let weight = down * across;
+                            if weight > 0.0 {
+                                sum += weight * self.texel((row * self.width + column) as usize);
+                            }
+                        }
+                    }
+                    sum
+                };
+                columns.iter().map(mean).collect()
+            })
+            .collect();
+        let texels = rows.iter().flatten();
+        let texels = match &self.texels {
+            Texels::Srgb8(_) => {
+                let color = |x: f32| SRGB8_OF_ROOT[(x.sqrt() * (SRGB8_OF_ROOT.len() - 1) as f32 + 0.5) as usize];
+                Texels::Srgb8(texels.flat_map(|t| [color(t.x), color(t.y), color(t.z), eight_bits(t.w)]).collect())
+            }
+            Texels::Linear8(_) => Texels::Linear8(texels.flat_map(|t| t.to_array().map(eight_bits)).collect()),
+            Texels::Float(_) => Texels::Float(texels.flat_map(|t| t.to_array()).collect()),
+        };
+        Texture { name: String::new(), width, height, texels, wrap: self.wrap, smaller: Vec::new() }
+    }
+
     /// Mean linear RGBA of all texels.
     pub fn mean(&self) -> Vec4 {
         let texels = self.width as usize * self.height as usize;
@@ -132,7 +211,7 @@ mod tests {
     use super::*;
 
     fn texture(texels: Texels, wrap: Wrap) -> Texture {
-        Texture { name: "t".into(), width: 2, height: 2, texels, wrap: [wrap; 2] }
+        Texture { name: "t".into(), width: 2, height: 2, texels, wrap: [wrap; 2], smaller: Vec::new() }
     }
 
     /// Red is the column, green the row.
@@ -174,6 +253,52 @@ mod tests {
         assert!((grey.x - 0.50289).abs() < 1e-5 && (grey.w - 188.0 / 255.0).abs() < 1e-7);
         assert_eq!(t.mean(), Vec4::splat(0.5));
         assert_eq!(t.min_alpha(), 0.0);
+    }
+
+    /// The mean of every level is that of the image, whatever its size; a constant stays what it is.
+    #[test]
+    fn smaller_images_have_the_same_mean() {
+        for [width, height] in [[1, 1], [2, 2], [5, 3], [7, 1], [16, 9], [33, 64]] {
+            let values = (0..width * height * 4).map(|i| (i * 37 % 101) as f32 / 101.0).collect();
+            let made = |texels| Texture {
+                name: "t".into(),
+                width,
+                height,
+                texels,
+                wrap: [Wrap::Clamp; 2],
+                smaller: Vec::new(),
+            };
+            let t = made(Texels::Float(values)).with_smaller();
+            assert_eq!(t.smaller.len(), width.max(height).next_power_of_two().ilog2() as usize);
+            for smaller in &t.smaller {
+                smaller.check().unwrap();
+                // Nine products and sums of values below one, six levels deep.
+                assert!((smaller.mean() - t.mean()).abs().max_element() < 54.0 * f32::EPSILON, "{width} {height}");
+            }
+            for byte in [0, 1, 7, 100, 188, 255] {
+                for texels in [Texels::Srgb8, Texels::Linear8] {
+                    let grey = made(texels(vec![byte; (width * height * 4) as usize])).with_smaller();
+                    for smaller in &grey.smaller {
+                        let (Texels::Srgb8(t) | Texels::Linear8(t)) = &smaller.texels else { panic!("eight bits") };
+                        assert!(t.iter().all(|&t| t == byte), "{byte} became {t:?}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn wide_samples_are_means() {
+        let checker = |i: u32| if (i % 64 + i / 64) % 2 == 0 { [1.0; 4] } else { [0.0, 0.0, 0.0, 1.0] };
+        let texels = Texels::Float((0..64 * 64).flat_map(checker).collect());
+        let t = Texture { width: 64, height: 64, ..texture(texels, Wrap::Repeat) }.with_smaller();
+        let at = Vec2::splat(0.5 / 64.0);
+        for sharp in [0.0, 0.5, 1.9, -1.0, f32::NAN] {
+            assert_eq!(t.sample_over(at, sharp), Vec4::ONE);
+        }
+        for wide in [2.0, 3.0, 64.0, 1e9, f32::INFINITY] {
+            assert_eq!(t.sample_over(at, wide), Vec4::new(0.5, 0.5, 0.5, 1.0), "{wide}");
+        }
     }
 
     #[test]

@@ -2,12 +2,12 @@
 
 use std::f32::consts::FRAC_1_PI;
 
-use glam::{Vec2, Vec3};
+use glam::{Vec2, Vec3, Vec4};
 
 use super::SurfacePoint;
 use super::layered::{Layered, Local};
 use crate::sampling::{basis, cosine_hemisphere};
-use crate::scene::Scene;
+use crate::scene::{Scene, TextureSlot};
 
 /// A sampled direction.
 #[derive(Clone, Copy, Debug)]
@@ -31,9 +31,8 @@ pub struct BsdfSample {
 /// glTF's metallic-roughness model, with these differences, each of which conserves energy where the specification's
 /// sample code does not: the diffuse lobe gets what the coat leaves (Kulla and Conty 2017), in place of a mix by
 /// Fresnel's term; light scattered between microfacets several times is returned; transmitting surfaces use the
-/// exact Fresnel equations in place of Schlick's. The reflecting part is reciprocal. Glass always belongs to f_h,
-/// whatever its roughness. Known loss: rough refracting solids return no multiple scattering (at normal incidence
-/// 0.6 % at roughness 0.5, 10 % at 1; more from inside).
+/// exact Fresnel equations in place of Schlick's. The part that reflects is reciprocal; rough glass, whose lobes are scaled
+/// towards the viewer, is not. Glass always belongs to f_h, whatever its roughness.
 ///
 /// Paths carry radiance from the light to the camera: where light enters a refracting solid seen from outside,
 /// `f` is divided by the square of the index of refraction, and multiplied where it leaves (pbrt 4ed 9.5.2).
@@ -77,20 +76,30 @@ impl Bsdf {
         if material.is_emitter() && (front || material.double_sided) {
             emission = scene.emission(point.triangle, point.u, point.v);
         }
-        let base_color = scene.base_color(point.triangle, point.u, point.v).clamp(Vec3::ZERO, Vec3::ONE);
+        let base_color = scene.base_color_over(point.triangle, point.u, point.v, point.footprint);
         let shading_normal = side * point.shading_normal;
         let layered = (!material.is_lambertian()).then(|| {
-            let (mut metallic, mut roughness) = (material.metallic, material.roughness);
-            if let Some(slot) = &material.metallic_roughness_texture {
-                let uv = slot.transform.transform_point2(point.uv[usize::from(slot.uv_set)]);
-                let texel = scene.textures[slot.texture as usize].sample(uv);
-                roughness *= texel.y;
-                metallic *= texel.z;
-            }
+            let texel = |slot: &Option<TextureSlot>| {
+                let slot = slot.as_ref()?;
+                Some(scene.texture_over(slot, point.triangle, point.u, point.v, point.footprint))
+            };
+            let surface = texel(&material.metallic_roughness_texture).unwrap_or(Vec4::ONE);
+            let mut roughness = material.roughness * surface.y;
             if material.transmission == 0.0 {
                 roughness = roughness.max(lobes.least_roughness);
             }
-            let at = Local { normal: shading_normal, outgoing, base_color, metallic, roughness, front };
+            let at = Local {
+                normal: shading_normal,
+                outgoing,
+                base_color,
+                metallic: material.metallic * surface.z,
+                roughness,
+                specular: material.specular * texel(&material.specular_texture).map_or(1.0, |t| t.w),
+                specular_color: material.specular_color
+                    * texel(&material.specular_color_texture).map_or(Vec3::ONE, |t| t.truncate()),
+                transmission: material.transmission * texel(&material.transmission_texture).map_or(1.0, |t| t.x),
+                front,
+            };
             Layered::new(material, object.kind, &at, lobes.threshold)
         });
         Bsdf {

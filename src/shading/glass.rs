@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use super::glass_albedo::{self, Parts};
 use super::layered::{Local, Reflection};
 use super::{fresnel, ggx};
 use crate::backend::PartKind;
@@ -10,7 +11,7 @@ use crate::scene::Material;
 /// Relative index of refraction closer to one than this bends nothing that f32 resolves.
 const INDEX_MATCHED: f32 = 1e-3;
 
-/// Quadrature points per axis for the albedo of rough glass.
+/// Quadrature points per axis for the albedo of rough sheets.
 const ALBEDO_POINTS: u32 = 12;
 
 /// How light goes on behind the surface.
@@ -39,7 +40,10 @@ pub struct Glass {
     specular_color: Vec3,
     /// Share of the material that is glass, times what makes up for masked facets.
     scale: f32,
-    /// Transmitted light is multiplied with it: base colour.
+    /// Where light goes that meets the rough boundary of a solid.
+    parts: Parts,
+    /// Transmitted light is multiplied with it. The base colour is that of light which went in and out, as in Cycles: each
+    /// boundary of two has its root.
     tint: Vec3,
     /// Whether shadow rays pass through.
     pane: bool,
@@ -59,20 +63,24 @@ impl Glass {
             geometry,
             ior,
             normal_reflectance: fresnel::at_normal(ior),
-            specular: material.specular,
-            specular_color: material.specular_color,
+            specular: at.specular,
+            specular_color: at.specular_color,
             scale: share,
-            tint: at.base_color,
+            parts: Parts::default(),
+            tint: if material.refracts { at.base_color.map(f32::sqrt) } else { at.base_color },
             pane,
         }
     }
 
-    /// Returns what masking takes from a rough sheet, given the lossless albedo towards the viewer (Turquin 2019): its
-    /// lobes on both sides have the shape of the reflecting one. Refracting solids keep that loss.
-    pub fn with_compensation(self, lossless_albedo: f32) -> Self {
+    /// Returns what masking takes from a rough surface that is seen at `cosine` (Turquin 2019). `mirror`: the lossless albedo of a
+    /// reflecting lobe there, whose shape those of a sheet have on both sides.
+    pub fn with_compensation(self, cosine: f32, roughness: f32, mirror: f32) -> Self {
         match self.geometry {
-            Geometry::Solid { .. } => self,
-            _ => Glass { scale: self.scale / lossless_albedo, ..self },
+            Geometry::Solid { eta } => {
+                let parts = glass_albedo::directional(eta, roughness, cosine);
+                Glass { scale: self.scale / parts.total(), parts, ..self }
+            }
+            _ => Glass { scale: self.scale / mirror, ..self },
         }
     }
 
@@ -164,8 +172,15 @@ impl Glass {
         reflected + transmitted
     }
 
-    /// Share of power that rough glass passes on, by a midpoint rule over its visible facets.
+    /// Share of power that rough glass passes on: for a sheet by a midpoint rule over its visible facets, for a solid from the
+    /// table, as if the colour at grazing angles were that at normal incidence.
     pub fn rough_albedo(&self, outgoing: Vec3, alpha: f32) -> Vec3 {
+        if matches!(self.geometry, Geometry::Solid { .. }) {
+            let colored = (self.specular * self.parts.reflected * self.specular_color).min(Vec3::ONE);
+            let reflected = Vec3::splat(self.parts.totally) + colored;
+            let transmitted = (Vec3::splat(self.parts.total()) - reflected).max(Vec3::ZERO);
+            return self.scale * (reflected + transmitted * self.tint);
+        }
         let mut sum = Vec3::ZERO;
         for i in 0..ALBEDO_POINTS * ALBEDO_POINTS {
             let [x, y] = [i % ALBEDO_POINTS, i / ALBEDO_POINTS].map(|k| (k as f32 + 0.5) / ALBEDO_POINTS as f32);

@@ -30,6 +30,12 @@ pub struct Local {
     pub metallic: f32,
     /// 0..=1.
     pub roughness: f32,
+    /// Strength of the dielectric's specular lobe, 0..=1.
+    pub specular: f32,
+    /// Its colour at normal incidence.
+    pub specular_color: Vec3,
+    /// Share of what is no metal that transmits, 0..=1.
+    pub transmission: f32,
     /// Whether `outgoing` is on the counter-clockwise side.
     pub front: bool,
 }
@@ -93,7 +99,7 @@ fn luminous(v: Vec3) -> f32 {
 impl Layered {
     /// Mixture for a material at a point.
     pub fn new(material: &Material, kind: PartKind, at: &Local, glossy_threshold: f32) -> Self {
-        let transmission = (1.0 - at.metallic) * material.transmission;
+        let transmission = (1.0 - at.metallic) * at.transmission;
         let opaque = (1.0 - at.metallic) - transmission;
         let mut glass = (transmission > 0.0).then(|| Glass::new(material, kind, transmission, at));
         let roughness = match &glass {
@@ -115,9 +121,9 @@ impl Layered {
 
         let normal_reflectance = fresnel::at_normal(material.ior);
         let mut coat = Coat {
-            f0: (normal_reflectance * material.specular_color).min(Vec3::ONE) * material.specular,
+            f0: (normal_reflectance * at.specular_color).min(Vec3::ONE) * at.specular,
             // Grazing reflectance vanishes with F0, so that an index of one has no interface (Lagarde 2014).
-            f90: Vec3::splat(material.specular * (50.0 * normal_reflectance).min(1.0)),
+            f90: Vec3::splat(at.specular * (50.0 * normal_reflectance).min(1.0)),
             multiple: Vec3::ZERO,
         };
         let mut multiple = Vec3::ZERO;
@@ -129,7 +135,7 @@ impl Layered {
             average = albedo::average(roughness);
             coat.multiple = multiple_color(coat.f0, coat.f90, average.total());
             multiple = opaque * coat.multiple + at.metallic * multiple_color(at.base_color, Vec3::ONE, average.total());
-            glass = glass.map(|glass| glass.with_compensation(here.total()));
+            glass = glass.map(|glass| glass.with_compensation(outgoing.z, roughness, here.total()));
             multiple_scale = 1.0 / (1.0 - average.total()).max(f32::MIN_POSITIVE);
         }
         let f0 = at.metallic * at.base_color + opaque * coat.f0;

@@ -8,6 +8,7 @@ pub mod bsdf;
 pub mod fresnel;
 pub mod ggx;
 mod glass;
+mod glass_albedo;
 mod layered;
 pub mod point;
 #[cfg(test)]

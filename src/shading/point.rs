@@ -31,6 +31,8 @@ pub struct SurfacePoint {
     pub u: f32,
     /// Barycentric weight of the third vertex.
     pub v: f32,
+    /// Width over which textures may be averaged, scene units; zero reads them at the point.
+    pub footprint: f32,
 }
 
 impl SurfacePoint {
@@ -75,14 +77,19 @@ impl SurfacePoint {
             triangle: hit.triangle,
             u: hit.u,
             v: hit.v,
+            footprint: 0.0,
         }
     }
 
     /// The point at `u`, `v` of a triangle with the given corners, which need not belong to a scene: flat, without texture
     /// coordinates. `triangle` is only stored.
     pub fn flat(corners: [Vec3; 3], triangle: u32, u: f32, v: f32) -> Self {
-        let plane = Plane::of(corners);
-        let (position, error) = locate(corners, &plane, u, v);
+        Self::on_plane(corners, &Plane::of(corners), triangle, u, v)
+    }
+
+    /// As [`SurfacePoint::flat`], with the plane of the corners known.
+    pub fn on_plane(corners: [Vec3; 3], plane: &Plane, triangle: u32, u: f32, v: f32) -> Self {
+        let (position, error) = locate(corners, plane, u, v);
         SurfacePoint {
             position,
             error,
@@ -92,12 +99,21 @@ impl SurfacePoint {
             triangle,
             u,
             v,
+            footprint: 0.0,
         }
     }
 
     /// The shading normal on the side of the surface that `outgoing` points to.
     pub fn shading_normal_towards(&self, outgoing: Vec3) -> Vec3 {
         if self.geometric_normal.dot(outgoing) > 0.0 { self.shading_normal } else { -self.shading_normal }
+    }
+
+    /// What the inside of a solid leaves of light that came through it to this point along `distance` and is seen from
+    /// `outgoing`: less than one only where that is behind the surface of something that absorbs.
+    pub fn absorption(&self, scene: &Scene, outgoing: Vec3, distance: f32) -> Vec3 {
+        let material = scene.material(self.triangle);
+        let inside = material.absorbs() && outgoing.dot(self.geometric_normal) < 0.0;
+        if inside { material.left_after(distance) } else { Vec3::ONE }
     }
 
     /// Origin for a ray that leaves into `direction`: moved along the geometric normal to the side of `direction`

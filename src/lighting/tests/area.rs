@@ -424,6 +424,7 @@ fn textured_light() {
         height: side as u32,
         texels: Texels::Float((0..side * side).flat_map(texel).collect()),
         wrap: [Wrap::Clamp; 2],
+        smaller: Vec::new(),
     }];
     let quarter: Vec<Vec3> = corners.iter().map(|&p| 0.5 * p).collect();
     let (position, normal) = (Vec3::new(0.3, -0.4, 0.8), Vec3::NEG_Z);

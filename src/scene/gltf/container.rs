@@ -33,7 +33,9 @@ impl Container {
         };
         match json.iter().find(|b| !b.is_ascii_whitespace()) {
             Some(b'{') => Ok(Container { json, bin: None }),
-            _ => Err("this is neither a binary glTF file (it does not start with \"glTF\") nor glTF JSON".into()),
+            _ => Err("this is neither a binary glTF file (it does not start with \"glTF\") nor glTF JSON; export scenes of other \
+                      programs as glTF 2.0 (.glb)"
+                .into()),
         }
     }
 }

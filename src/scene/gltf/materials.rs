@@ -49,6 +49,14 @@ pub(super) fn convert(
     material.metallic_roughness_texture =
         pbr.metallic_roughness_texture.as_ref().map(|t| slot(t, Coding::Data)).transpose()?;
     material.emission_texture = source.emissive_texture.as_ref().map(|t| slot(t, Coding::Color)).transpose()?;
+    if let Some(extensions) = &source.extensions {
+        extend(&mut material, extensions, &mut slot)?;
+        if extensions.others.contains_key("KHR_materials_unlit") {
+            // Unlit is not a thing in a world with light: the colour is taken for a reflectance.
+            (material.metallic, material.roughness, material.specular) = (0.0, 1.0, 0.0);
+            builder.warn(format!("material '{name}' is unlit; it is treated as a matt surface of its colour"));
+        }
+    }
     if let Some(normal) = &source.normal_texture {
         let others = normal.extensions.as_ref().map(|e| &e.others);
         let (affine, set) = transform_of(others.and_then(|o| o.get("KHR_texture_transform")))
@@ -58,9 +66,6 @@ pub(super) fn convert(
         material.normal_texture = Some(slot.map_err(|e| format!("material '{name}': {e}"))?);
         material.normal_scale = normal.scale;
     }
-    if let Some(extensions) = &source.extensions {
-        extend(&mut material, extensions, &name, builder);
-    }
     material.name = name;
     Ok(material)
 }
@@ -68,14 +73,9 @@ pub(super) fn convert(
 fn extend(
     material: &mut Material,
     extensions: &gltf::json::extensions::material::Material,
-    name: &str,
-    builder: &mut SceneBuilder,
-) {
-    let mut ignore = |what: &str, present: bool| {
-        if present {
-            builder.warn(format!("material '{name}': the {what} texture is not supported; only its factor counts"));
-        }
-    };
+    slot: &mut impl FnMut(&texture::Info, Coding) -> Result<TextureSlot, String>,
+) -> Result<(), String> {
+    let mut optional = |info: &Option<texture::Info>, coding| info.as_ref().map(|info| slot(info, coding)).transpose();
     if let Some(strength) = &extensions.emissive_strength {
         material.emission *= strength.emissive_strength.0;
     }
@@ -85,23 +85,20 @@ fn extend(
     if let Some(specular) = &extensions.specular {
         material.specular = specular.specular_factor.0;
         material.specular_color = Vec3::from_array(specular.specular_color_factor.0);
-        ignore("specular", specular.specular_texture.is_some() || specular.specular_color_texture.is_some());
+        material.specular_texture = optional(&specular.specular_texture, Coding::Data)?;
+        material.specular_color_texture = optional(&specular.specular_color_texture, Coding::Color)?;
     }
     if let Some(transmission) = &extensions.transmission {
         material.transmission = transmission.transmission_factor.0;
-        ignore("transmission", transmission.transmission_texture.is_some());
+        material.transmission_texture = optional(&transmission.transmission_texture, Coding::Data)?;
     }
     if let Some(volume) = &extensions.volume {
+        // How thick it is says the geometry.
         material.refracts = volume.thickness_factor.0 > 0.0;
         material.attenuation_color = Vec3::from_array(volume.attenuation_color.0);
         material.attenuation_distance = volume.attenuation_distance.0;
-        ignore("thickness", volume.thickness_texture.is_some());
     }
-    if extensions.others.contains_key("KHR_materials_unlit") {
-        // Unlit is not a thing in a world with light: the colour is taken for a reflectance.
-        (material.metallic, material.roughness, material.specular) = (0.0, 1.0, 0.0);
-        builder.warn(format!("material '{name}' is unlit; it is treated as a matt surface of its colour"));
-    }
+    Ok(())
 }
 
 /// `KHR_texture_transform`: translation times rotation times scale.

@@ -152,6 +152,32 @@ fn lights_cameras_and_materials_arrive() {
     assert_eq!(scene.notes.warnings.iter().filter(|w| w.contains("XYZ_unknown")).count(), 1);
 }
 
+/// Textures of extensions of materials arrive with their coding, and what they say is seen where it is looked for.
+#[test]
+fn extension_textures_arrive() {
+    let mut value = triangle();
+    // Two texels side by side: black, and red half as bright as it can be encoded.
+    value["images"] = json!([{"name": "t.ppm", "uri": data_uri(b"P6 2 1 255\n\0\0\0\x80\0\0")}]);
+    value["textures"] = json!([{"source": 0, "sampler": 0}]);
+    value["samplers"] = json!([{"wrapS": 33071, "wrapT": 33071}]);
+    value["materials"] = json!([{"extensions": {
+        "KHR_materials_transmission": {"transmissionFactor": 1.0, "transmissionTexture": {"index": 0}},
+        "KHR_materials_specular": {"specularTexture": {"index": 0}, "specularColorTexture": {"index": 0}},
+        "KHR_materials_volume": {"thicknessFactor": 0.1, "thicknessTexture": {"index": 0}}}}]);
+    value["meshes"][0]["primitives"][0]["material"] = json!(0);
+    let scene = load_json(&value).unwrap();
+    assert_eq!(scene.notes.warnings, Vec::<String>::new());
+    let m = &scene.materials[0];
+    let read = |slot: &Option<crate::scene::TextureSlot>| {
+        let texture = &scene.textures[slot.as_ref().unwrap().texture as usize];
+        [0.0, 1.0].map(|u| texture.sample(glam::Vec2::new(u, 0.5)).to_array())
+    };
+    let byte = 128.0 / 255.0;
+    assert_eq!(read(&m.transmission_texture), [[0.0, 0.0, 0.0, 1.0], [byte, 0.0, 0.0, 1.0]]);
+    assert_eq!(m.specular_texture, m.transmission_texture);
+    assert_eq!(read(&m.specular_color_texture)[1][0], crate::srgb::srgb_decode(byte));
+}
+
 #[test]
 fn instances_are_flattened() {
     let mut value = triangle();

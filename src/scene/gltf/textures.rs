@@ -72,7 +72,7 @@ impl<'a> Textures<'a> {
             let fail = |e: String| format!("image {image} '{name}': {e}");
             let pixels = decode_texture(&name, &bytes(root, buffers, image).map_err(fail)?).map_err(fail)?;
             let (width, height) = (pixels.width, pixels.height);
-            Ok(Texture { name, width, height, texels: texels(pixels, coding), wrap })
+            Ok(Texture { name, width, height, texels: texels(pixels, coding), wrap, smaller: Vec::new() })
         });
         // Collected before the first error is taken, so that the message does not depend on the threads.
         let decoded: Vec<Result<Texture, String>> = decoded.collect();

@@ -3,13 +3,15 @@
 //! Statistical tests use fixed seeds: they give the same answer every time. The stated false-alarm rate is the chance with which
 //! another seed would fail although nothing is wrong.
 
-mod common;
+#[allow(dead_code, reason = "its main is not needed")]
+#[path = "../../examples/library.rs"]
+mod library;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use common::{
-    Estimate, cluttered_room, fixed, gltf, interpolated, lit_room, prepare, render, scene, threshold, values,
+use crate::common::{
+    self, Estimate, cluttered_room, fixed, gltf, interpolated, lit_room, prepare, render, scene, threshold, values,
 };
 use gsii::pipeline::{BackendKind, Method, Settings};
 use gsii::render::{RenderParams, World, bias};
@@ -30,6 +32,17 @@ fn image(settings: Settings, params: &RenderParams) -> Vec<f64> {
 }
 
 #[test]
+fn the_example_of_the_documentation_renders() {
+    let folder = tempfile::tempdir().unwrap();
+    let [file, picture] = ["room.gltf", "room.exr"].map(|name| folder.path().join(name));
+    std::fs::write(&file, lit_room()).unwrap();
+    library::render(&file, &picture, 24, 16).unwrap();
+    let image = gsii::image::read(&picture).unwrap();
+    assert_eq!((image.width(), image.height()), (24, 16));
+    assert!(image.channel("depth.Z").unwrap().iter().all(|&depth| depth > 0.0), "the room is closed");
+}
+
+#[test]
 fn the_number_of_threads_does_not_change_a_bit() {
     for method in [Method::Gsii, Method::Pmm, Method::Mcpt, Method::Radiosity] {
         let adaptive = RenderParams { max_trials: 64, ..interpolated(45, 30, 4, 0) };
@@ -44,7 +57,7 @@ fn the_number_of_threads_does_not_change_a_bit() {
 
 #[test]
 fn seeds_make_different_images() {
-    for method in [Method::Gsii, Method::Mcpt] {
+    for method in [Method::Gsii, Method::Pmm, Method::Mcpt, Method::Radiosity] {
         let of = |seed| bits(&image(Settings { seed, ..with(method) }, &fixed(24, 16, 4, seed)));
         assert_ne!(of(0), of(1), "{method:?}");
     }
