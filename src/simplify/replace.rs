@@ -21,7 +21,7 @@ use crate::scene::{Aabb, Scene};
 /// Lines for all fits together, for each triangle of the scene and at least: what keeps simplification under two seconds per
 /// million triangles.
 const LINES_PER_TRIANGLE: usize = 1;
-const LEAST_BUDGET: usize = 1 << 17;
+const LEAST_BUDGET: usize = 1 << 18;
 
 /// Most lines for one fit; `sampling::sobol` has as many points in a stream.
 const MOST_LINES: u32 = 1 << 15;
