@@ -26,8 +26,9 @@ pub fn render(scene: &Path, output: &Path, width: u32, height: u32) -> gsii::Res
         region: None,
         min_trials: 16,
         max_trials: 512,
-        hires_error: 0.05,
-        lores_error: 0.05,
+        error: 0.03,       // of the image
+        hires_error: 0.12, // of any pixel
+        lores_error: 0.12,
         time_limit: None,
         features: true, // albedo, normal and depth are recorded
         interpolate: true,

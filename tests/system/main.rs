@@ -2,6 +2,7 @@
 //! number of its own among the reference cases (`tests/cases`). One binary: every further one would compile and link the library's
 //! generic code again, and wait for its last test with one core idle.
 
+mod caustics;
 mod command_line;
 #[path = "../common/mod.rs"]
 mod common;

@@ -3,11 +3,9 @@
 //! Statistical tests use fixed seeds: they give the same answer every time. The stated false-alarm rate is the chance with which another
 //! seed would fail although nothing is wrong.
 
-mod common;
-
 use std::sync::Arc;
 
-use common::{Body, fixed, interpolated, lit_room, prepare, render, scene, values};
+use crate::common::{Body, fixed, interpolated, lit_room, prepare, render, scene, values};
 use glam::{DAffine3, DVec3, Mat3, Vec3};
 use gsii::pipeline::{Method, Settings};
 use gsii::progress::Progress;
