@@ -4,6 +4,8 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 scripts/setup.sh
+echo "Building gsii (minutes, the first time) ..."
+cargo build --release --locked --bin gsii
 mkdir -p out
 echo "Rendering scenes/office-high.glb to out/office.exr and out/office.png ..."
 cargo run --release --locked --quiet -- render scenes/office-high.glb -o out/office.exr -o out/office.png "$@"

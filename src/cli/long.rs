@@ -7,7 +7,7 @@ use std::time::Duration;
 use clap::Args;
 
 use crate::error::{Error, Result};
-use crate::render::checkpoint::{self, Identity};
+use crate::render::checkpoint::{self, LateIdentity};
 use crate::render::watch::{Rhythm, Saver, TevViewer};
 use crate::render::{Moment, RenderParams, Session, Watcher};
 
@@ -83,20 +83,15 @@ impl LongOptions {
     /// Where the unfinished rendering of `image` is kept: in `named` where an option says so. `None` when it is not.
     ///
     /// # Errors
-    /// A checkpoint that is to be continued but is damaged, or of another rendering than `identity` says.
-    pub fn keep(
-        &self,
-        image: &Path,
-        named: Option<&Path>,
-        identity: impl FnOnce() -> Result<Identity>,
-    ) -> Result<Option<Checkpoint>> {
+    /// A checkpoint that is to be continued but is damaged, or of another rendering than `identity` says; those of finding that out.
+    pub fn keep(&self, image: &Path, named: Option<&Path>, identity: LateIdentity) -> Result<Option<Checkpoint>> {
         if self.checkpoint_every == 0.0 {
             return Ok(None);
         }
-        let kept = Checkpoint { path: place(image, named), identity: identity()? };
+        let kept = Checkpoint { path: place(image, named), identity };
         let name = kept.path.display();
         match (self.resume, kept.path.exists()) {
-            (true, true) => checkpoint::check(&kept.path, &kept.identity)?,
+            (true, true) => checkpoint::check(&kept.path, kept.identity.get()?)?,
             (true, false) => log::warn!("there is no checkpoint {name}: the rendering starts from the beginning"),
             (false, true) => {
                 log::warn!("{name} is of an unfinished rendering, which --resume would go on with; it will be replaced")
@@ -117,7 +112,9 @@ impl LongOptions {
     /// As [`LongOptions::keep`].
     pub fn session(&self, kept: Option<&Checkpoint>, params: &RenderParams) -> Result<Session> {
         match kept {
-            Some(kept) if self.resume && kept.path.exists() => checkpoint::read(&kept.path, &kept.identity, params),
+            Some(kept) if self.resume && kept.path.exists() => {
+                checkpoint::read(&kept.path, kept.identity.get()?, params)
+            }
             _ => Ok(Session::new(params)),
         }
     }
@@ -161,7 +158,7 @@ fn place(image: &Path, named: Option<&Path>) -> PathBuf {
 /// A file that keeps a rendering.
 pub struct Checkpoint {
     path: PathBuf,
-    identity: Identity,
+    identity: LateIdentity,
 }
 
 impl Checkpoint {

@@ -50,6 +50,10 @@ pub struct MethodOptions {
     /// Distance up to which indirect light is traced in the detailed scene (scene units; 0 is PMM, inf is path tracing)
     #[arg(long, value_name = "LENGTH|auto", default_value = "auto", help_heading = "Method")]
     pub r_thresh: LengthOrAuto,
+    /// No bias but noise: to each trial what the far field gets wrong on its path is added, as the bias meter measures it. That is
+    /// path tracing, as with '--r-thresh inf'
+    #[arg(long, conflicts_with = "r_thresh", help_heading = "Method")]
+    pub unbiased: bool,
     /// Share of the hemisphere that one dropped surface may fill, 0..1 [default: 0.02; the paper: 0.159]
     #[arg(long, value_name = "X", help_heading = "Method")]
     pub beta: Option<f32>,
@@ -124,7 +128,8 @@ impl MethodOptions {
         Settings {
             method: self.method,
             geometry: self.geometry,
-            r_thresh: self.r_thresh.0,
+            // A path's far field and its residual add up to the path: there is no need to look up either.
+            r_thresh: if self.unbiased { Some(f32::INFINITY) } else { self.r_thresh.0 },
             beta: self.beta.unwrap_or(default.beta),
             box_fit: self.box_fit,
             patch_size: self.patch_size.0,

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::str::FromStr;
+use std::sync::Arc;
 use std::time::Duration;
 
 use clap::Args;
@@ -18,10 +19,20 @@ use crate::image::Metadata;
 use crate::pipeline::identity::identity;
 use crate::pipeline::{Method, Prepared, Stats, choose_camera_among};
 use crate::progress::Progress;
+use crate::render::checkpoint::LateIdentity;
 use crate::render::layers::{Layer, develop};
 use crate::render::{Region, RenderParams, Rendering, Session, World, bias};
 use crate::scene::{Camera, Scene};
 use crate::unfinished;
+
+/// Relative error of an image that is aimed at where nothing else is asked for.
+const ERROR: f32 = 0.03;
+
+/// How much larger the error of single pixels may be than that of the image: what is left of noise is grain, not specks.
+const WORST_PIXEL: f32 = 4.0;
+
+/// Relative error of a pixel in the paper.
+const PIXEL_ERROR: f32 = 0.05;
 
 /// Pairs of paths that measure the bias when not said otherwise.
 const BIAS_SAMPLES: u32 = 1 << 15;
@@ -67,17 +78,17 @@ pub struct Options {
     /// Render only part I (from 1) of N that the image is cut into; 'gsii merge' joins them
     #[arg(long, value_name = "I/N")]
     tile: Option<PartOf>,
-    /// Relative error of a pixel to aim for, in both passes
+    /// Relative error of the image to aim for (root of the mean square over its pixels) [default: 0.03]
     #[arg(long, value_name = "X", help_heading = "Quality")]
     error: Option<f32>,
-    /// Relative error of a pixel at which HIRES stops [default: 0.05]
+    /// Relative error of a pixel at which HIRES may stop, as in the paper [default: four times --error]
     #[arg(long, value_name = "X", help_heading = "Quality")]
     hires_error: Option<f32>,
-    /// Relative error of a pixel, both passes together, at which LORES stops [default: 0.05]
+    /// Relative error of a pixel, both passes together, at which LORES may stop, as in the paper [default: four times --error]
     #[arg(long, value_name = "X", help_heading = "Quality")]
     lores_error: Option<f32>,
     /// Fewest trials of a pixel in each pass
-    #[arg(long, value_name = "N", default_value_t = 16, help_heading = "Quality")]
+    #[arg(long, value_name = "N", default_value_t = 4, help_heading = "Quality")]
     min_trials: u32,
     /// Most trials of a pixel in each pass
     #[arg(long, value_name = "N", default_value_t = 512, help_heading = "Quality")]
@@ -215,12 +226,14 @@ impl Options {
     /// Where the rendering of a view is kept while it is not finished; `cameras` are those that the scene is prepared for.
     pub(super) fn keep(
         &self,
-        scene: &Scene,
+        scene: &Arc<Scene>,
         cameras: &[Camera],
         view: &View,
         params: &RenderParams,
     ) -> Result<Option<Checkpoint>> {
-        let identity = || identity(scene, cameras, &view.camera, &self.method.settings(), params);
+        let (scene, settings, params) = (Arc::clone(scene), self.method.settings(), params.clone());
+        let (cameras, camera) = (cameras.to_vec(), view.camera.clone());
+        let identity = LateIdentity::new(move || identity(&scene, &cameras, &camera, &settings, &params));
         self.long.keep(&view.outputs[0], view.checkpoint.as_deref(), identity)
     }
 
@@ -291,8 +304,11 @@ impl Options {
             (None, Some(h)) => ((h as f32 * aspect).round().max(1.0) as u32, h),
             (None, None) => (1280, (1280.0 / aspect).round().max(1.0) as u32),
         };
-        let error = self.error.unwrap_or(0.05);
-        let (hires_error, lores_error) = (self.hires_error.unwrap_or(error), self.lores_error.unwrap_or(error));
+        // The paper's rule alone, where one of its errors is named.
+        let by_pixel = self.error.is_none() && (self.hires_error.is_some() || self.lores_error.is_some());
+        let error = if by_pixel || self.spp.is_some() { f32::INFINITY } else { self.error.unwrap_or(ERROR) };
+        let worst = if by_pixel { PIXEL_ERROR } else { WORST_PIXEL * error };
+        let (hires_error, lores_error) = (self.hires_error.unwrap_or(worst), self.lores_error.unwrap_or(worst));
         let (min_trials, max_trials) = self.spp.map_or((self.min_trials, self.max_trials), |n| (n, n));
         let refuse = |what: &str| Err(Error::Usage(what.to_owned()));
         if width == 0 || height == 0 || width > 1 << 16 || height > 1 << 16 {
@@ -301,7 +317,7 @@ impl Options {
         if min_trials == 0 || min_trials > max_trials {
             return refuse("--min-trials must be at least 1 and at most --max-trials");
         }
-        if !(hires_error > 0.0 && lores_error > 0.0) {
+        if !(error > 0.0 && hires_error > 0.0 && lores_error > 0.0) {
             return refuse("errors must be above 0 (0.05 is 5 %)");
         }
         if self.time_limit.is_some_and(|t| !(t > 0.0 && t < 1e9)) {
@@ -313,6 +329,7 @@ impl Options {
             region: self.region([width, height])?,
             min_trials,
             max_trials,
+            error,
             hires_error,
             lores_error,
             time_limit: self.time_limit.map(Duration::from_secs_f64),
@@ -378,6 +395,7 @@ impl Options {
             ("height", params.height.into()),
             ("min_trials", params.min_trials.into()),
             ("max_trials", params.max_trials.into()),
+            ("error", serde_json::json!(params.error)),
             ("hires_error", serde_json::json!(params.hires_error)),
             ("lores_error", serde_json::json!(params.lores_error)),
             ("time_limit", serde_json::json!(self.time_limit)),

@@ -9,7 +9,7 @@ mod bounds;
 mod emission;
 mod environment;
 mod openings;
-mod punctual;
+pub(crate) mod punctual;
 pub mod shadow;
 mod spherical;
 mod tree;

@@ -27,18 +27,23 @@ pub(super) fn incident(light: &PunctualLight, position: Vec3) -> Option<(Vec3, f
     let offset = at.as_dvec3() - position.as_dvec3();
     let distance = offset.length();
     let direction = (offset / distance).as_vec3();
-    let attenuation = match light.kind {
-        LightKind::Spot { direction: axis, cos_inner, cos_outer, .. } => {
-            spot_attenuation(-direction.dot(axis), cos_inner, cos_outer)
-        }
-        _ => 1.0,
-    };
-    let irradiance = (light.intensity.as_dvec3() * f64::from(attenuation) / (distance * distance)).as_vec3();
+    let intensity = intensity_towards(light, -direction);
+    let irradiance = (intensity.as_dvec3() / (distance * distance)).as_vec3();
     (irradiance.is_finite() && irradiance.max_element() > 0.0).then_some((direction, distance as f32, irradiance))
 }
 
+/// Radiant intensity of a point or spot light into a unit direction, W/sr.
+pub(crate) fn intensity_towards(light: &PunctualLight, direction: Vec3) -> Vec3 {
+    match light.kind {
+        LightKind::Spot { direction: axis, cos_inner, cos_outer, .. } => {
+            light.intensity * spot_attenuation(direction.dot(axis), cos_inner, cos_outer)
+        }
+        _ => light.intensity,
+    }
+}
+
 /// Solid angle that would emit the light's flux at full intensity; for directional lights the area of a disk of `radius`.
-pub(super) fn effective_extent(light: &PunctualLight, radius: f64) -> f64 {
+pub(crate) fn effective_extent(light: &PunctualLight, radius: f64) -> f64 {
     match light.kind {
         LightKind::Point { .. } => 4.0 * PI,
         LightKind::Spot { cos_inner, cos_outer, .. } => {
@@ -50,7 +55,7 @@ pub(super) fn effective_extent(light: &PunctualLight, radius: f64) -> f64 {
 }
 
 /// A direction from a point or spot light with density proportional to its intensity.
-pub(super) fn emitted_direction(light: &PunctualLight, u: Vec2) -> Vec3 {
+pub(crate) fn emitted_direction(light: &PunctualLight, u: Vec2) -> Vec3 {
     match light.kind {
         LightKind::Point { .. } => uniform_sphere(u),
         LightKind::Spot { direction, cos_inner, cos_outer, .. } => {

@@ -28,6 +28,7 @@ pub fn identity(
         region,
         min_trials,
         max_trials,
+        error,
         hires_error,
         lores_error,
         time_limit: _,
@@ -56,6 +57,7 @@ pub fn identity(
     add("region", region.map_or("the whole image".to_owned(), |r| format!("{:?} to {:?}", r.low, r.high)));
     add("min_trials", min_trials.to_string());
     add("max_trials", max_trials.to_string());
+    add("error", error.to_string());
     add("hires_error", hires_error.to_string());
     add("lores_error", lores_error.to_string());
     add("per_pixel", (!interpolate).to_string());

@@ -23,7 +23,9 @@ use crate::error::{Error, Result};
 use crate::lighting::Lights;
 use crate::progress::Progress;
 use crate::radiosity::RadiosityParams;
-use crate::render::{self, FarField, IrradianceCache, RenderParams, Rendering, Round, Session, Watcher, World};
+use crate::render::{
+    self, Caustics, FarField, IrradianceCache, RenderParams, Rendering, Round, Session, Watcher, World,
+};
 use crate::scene::{Camera, Scene};
 use crate::shading::Lobes;
 use crate::simplify::{self, Simplified, SimplifyParams};
@@ -39,6 +41,8 @@ pub struct Prepared {
     pub detailed: Box<dyn RayScene>,
     /// What light from beyond `r_thresh` is taken from; `None` for path tracing.
     pub far: Option<Far>,
+    /// Photons from small light sources, where mirrors or glass bend their light; `None` for path tracing.
+    pub caustics: Option<Caustics>,
     /// Settings with every automatic choice filled in.
     pub settings: Settings,
     /// Indirect light that all images are interpolated from; see [`Prepared::share_between`].
@@ -90,9 +94,20 @@ impl Prepared {
             Method::Gsii if 0.5 * settings.r_thresh() > scene.mesh.bounds.size().length() => None,
             _ => Some(Far::new(&scene, &lights, backend.as_ref(), &settings, &mut kept, progress, stats)?),
         };
+        let caustics = match (settings.method, &far) {
+            (Method::Gsii | Method::Pmm, Some(_)) => {
+                let start = Stopwatch::start();
+                let reach = settings.radiosity_params().patch_size;
+                let caustics = Caustics::new(&scene, &lights, detailed.as_ref(), reach, settings.seed);
+                stats.record_time(start, |s| &mut s.caustics);
+                caustics
+            }
+            _ => None,
+        };
+        stats.counts.photons = caustics.as_ref().map_or(0, |c| c.len() as u64);
         stats.parameters = settings.parameters();
         stats.cache = kept.used();
-        Ok(Prepared { scene, lights, detailed, far, settings, flight: None, kept })
+        Ok(Prepared { scene, lights, detailed, far, caustics, settings, flight: None, kept })
     }
 
     /// What the renderer works with.
@@ -116,6 +131,7 @@ impl Prepared {
                 least_roughness: if self.far.is_some() { self.settings.filter_glossy } else { 0.0 },
             },
             cache: self.flight.as_ref(),
+            caustics: self.caustics.as_ref(),
             max_depth: self.settings.max_depth,
         }
     }
@@ -206,7 +222,9 @@ pub fn simplify_only(
         settings = automatic(scene, std::slice::from_ref(camera), settings)?;
     }
     let mut kept = Kept::open(&settings, scene, backend.as_ref())?;
+    let start = Stopwatch::start();
     let simplified = kept.simplify(scene, backend.as_ref(), &settings.simplify_params(), progress)?;
+    stats.record_time(start, |s| &mut s.simplify);
     stats.cache = kept.used();
     stats.record_simplified(&simplified);
     Ok((simplified, settings))

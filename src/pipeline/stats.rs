@@ -60,6 +60,8 @@ pub struct Seconds {
     pub build: f64,
     /// Radiosity solution.
     pub radiosity: f64,
+    /// Photons for caustics.
+    pub caustics: f64,
     /// Irradiance cache that frames share.
     pub flight: f64,
     /// HIRES pass.
@@ -104,6 +106,8 @@ pub struct Counts {
     pub clusters: u64,
     /// Patches of the radiosity solution.
     pub patches: u64,
+    /// Photons for caustics.
+    pub photons: u64,
     /// Trials that were not finite and were dropped.
     pub dropped_trials: u64,
 }

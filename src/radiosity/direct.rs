@@ -1,15 +1,16 @@
 //! Direct light on patches by sampling the light sources.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::RadiosityScene;
 use super::patches::Patches;
 use super::shoot::side_normal;
 use crate::backend::{Coherence, Ray};
-use crate::lighting::Lit;
 use crate::lighting::shadow::{ShadowBuffers, ShadowRay, light_visibility};
+use crate::lighting::{LightSample, Lit};
 use crate::sampling;
+use crate::shading::SurfacePoint;
 
 /// Samples a side gets before it is known how much it varies ...
 const PILOT: u32 = 8;
@@ -101,29 +102,60 @@ fn estimate(input: &RadiosityScene<'_>, patches: &Patches, counts: &[u32], strea
     counts
         .par_chunks(JOB)
         .enumerate()
-        .flat_map_iter(|(job, counts)| {
-            let mut rays = Vec::new();
-            let mut values: Vec<(usize, DVec3)> = Vec::new();
+        .map_init(Buffers::default, |buffers, (job, counts)| {
+            let Buffers { points, lit, samples, owners, rays, values, through, shadow } = buffers;
+            points.clear();
+            lit.clear();
+            owners.clear();
             for (k, &count) in counts.iter().enumerate() {
                 let side = (job * JOB + k) as u32;
+                if patches.is_inside_of_box(side) {
+                    continue;
+                }
+                let stream = sampling::hash_all(&[stream, side]);
                 for i in 0..count {
-                    if let Some((ray, value)) = sample(input, patches, side, i, stream) {
-                        rays.push(ray);
-                        values.push((k, value));
-                    }
+                    let s = sampling::sobol(i, 0, stream);
+                    let choice = sampling::sobol(i, 1, stream)[0];
+                    let point = patches.open_point(input.geometry, side, [s[0], s[1]]);
+                    lit.push(Lit {
+                        position: point.position,
+                        normal: side_normal(&point, side),
+                        u: [choice, s[2], s[3]],
+                    });
+                    points.push(point);
+                    owners.push(k as u32);
                 }
             }
-            let mut through = vec![glam::Vec3::ONE; rays.len()];
+            input.lights.sample_all(input.scene, lit, samples);
+            rays.clear();
+            values.clear();
+            for (((point, lit), sample), &owner) in points.iter().zip(lit.iter()).zip(samples.iter()).zip(owners.iter())
+            {
+                let Some(light) = sample else { continue };
+                let cos = light.direction.dot(lit.normal);
+                if cos <= 0.0 || light.weight.max_element() <= 0.0 {
+                    continue;
+                }
+                let ray = Ray {
+                    origin: point.ray_origin(light.direction),
+                    t_near: 0.0,
+                    direction: light.direction,
+                    t_far: light.distance,
+                };
+                rays.push(ShadowRay { ray, light: light.triangle });
+                values.push((owner, f64::from(cos) * light.weight.as_dvec3()));
+            }
+            through.clear();
+            through.resize(rays.len(), Vec3::ONE);
             let sources = Some(input.geometry.sources.as_slice());
-            let buffers = &mut ShadowBuffers::default();
-            light_visibility(input.rays, input.scene, sources, &rays, Coherence::Coherent, buffers, &mut through);
+            light_visibility(input.rays, input.scene, sources, rays, Coherence::Coherent, shadow, through);
             let mut estimates = vec![Estimate::default(); counts.len()];
-            let mut squares = vec![0.0; counts.len()];
-            for ((k, value), seen) in values.into_iter().zip(through) {
+            let mut squares = [0.0; JOB];
+            for (&(k, value), seen) in values.iter().zip(through.iter()) {
                 let value = value * seen.as_dvec3();
-                estimates[k].mean += value;
-                estimates[k].rays += 1;
-                squares[k] += value.element_sum().powi(2);
+                estimates[k as usize].mean += value;
+                estimates[k as usize].rays += 1;
+                squares[k as usize] += value.element_sum().powi(2);
             }
             for ((estimate, square), &count) in estimates.iter_mut().zip(squares).zip(counts) {
                 let n = f64::from(count.max(1));
@@ -134,37 +166,21 @@ fn estimate(input: &RadiosityScene<'_>, patches: &Patches, counts: &[u32], strea
             }
             estimates
         })
+        .flatten_iter()
         .collect()
 }
 
-/// A shadow ray and the irradiance it brings when nothing is in its way.
-fn sample(
-    input: &RadiosityScene<'_>,
-    patches: &Patches,
-    side: u32,
-    index: u32,
-    stream: u32,
-) -> Option<(ShadowRay, DVec3)> {
-    if patches.is_inside_of_box(side) {
-        return None;
-    }
-    let stream = sampling::hash_all(&[stream, side]);
-    let s = sampling::sobol(index, 0, stream);
-    let choice = sampling::sobol(index, 1, stream)[0];
-    let point = patches.open_point(input.geometry, side, [s[0], s[1]]);
-    let normal = side_normal(&point, side);
-    let lit = Lit { position: point.position, normal, u: [choice, s[2], s[3]] };
-    let light = input.lights.sample(input.scene, &lit)?;
-    let cos = light.direction.dot(normal);
-    if cos <= 0.0 || light.weight.max_element() <= 0.0 {
-        return None;
-    }
-    let ray = Ray {
-        origin: point.ray_origin(light.direction),
-        t_near: 0.0,
-        direction: light.direction,
-        t_far: light.distance,
-    };
-    let shadow = ShadowRay { ray, light: light.triangle };
-    Some((shadow, f64::from(cos) * light.weight.as_dvec3()))
+/// Memory that jobs share.
+#[derive(Default)]
+struct Buffers {
+    points: Vec<SurfacePoint>,
+    lit: Vec<Lit>,
+    samples: Vec<Option<LightSample>>,
+    /// Number of the side in its job, for each point.
+    owners: Vec<u32>,
+    rays: Vec<ShadowRay>,
+    /// For each ray the number of its side, and the irradiance it brings when nothing is in its way.
+    values: Vec<(u32, DVec3)>,
+    through: Vec<Vec3>,
+    shadow: ShadowBuffers,
 }

@@ -148,10 +148,14 @@ pub struct RadiosityScene<'a> {
     pub rays: &'a dyn RayScene,
 }
 
-/// Rays of the first solution for each lit side: enough to estimate the error.
-const FIRST_RAYS: u64 = 16;
+/// Rays of the first solution for each lit side, in proportion to its relevance: enough to estimate the error.
+const FIRST_RAYS: f64 = 4.0;
+/// The same for few sides, where another solution would cost more than what it could save in rays ...
+const FIRST_RAYS_OF_FEW: f64 = 16.0;
+/// ... up to this number of rays.
+const FEW_RAYS: f64 = 65536.0;
 /// Fewest rays that the light of the first bounce is shot with.
-const LEAST_RAYS: u64 = 1 << 15;
+const LEAST_RAYS: u64 = 1 << 13;
 /// Solutions that may be averaged to reach the error.
 const MAX_ROUNDS: u32 = 4;
 
@@ -226,19 +230,24 @@ impl Average {
             DirectLight::Shoot => None,
         };
         self.rays += direct.as_ref().map_or(0, |d| d.rays);
-        let lit = match &direct {
-            Some(direct) => direct.incident[0].iter().filter(|f| **f != DVec3::ZERO).count(),
-            None => tracer.patches.len(),
+        let relevance = |side: usize| tracer.patches.relevance[side / 2];
+        let lit: f64 = match &direct {
+            Some(direct) => {
+                let sides = 0..direct.incident[0].len();
+                sides.filter(|&side| direct.incident[0][side] != DVec3::ZERO).map(relevance).sum()
+            }
+            None => tracer.patches.relevance.iter().sum(),
         };
         // Direct light is gathered once; more shooting does not reduce its error.
         let of_direct = direct.as_ref().map_or(0.0, |d| d.error).min(0.9 * target);
-        let mut rays = (FIRST_RAYS * lit as u64).max(LEAST_RAYS);
+        let first = (FIRST_RAYS_OF_FEW * lit).min(FEW_RAYS).max(FIRST_RAYS * lit);
+        let mut rays = (first as u64).max(LEAST_RAYS);
         let mut total = 0;
         for round in 0..MAX_ROUNDS {
             self.add_pair(tracer, params, direct.as_ref(), rays, round, progress)?;
             total += rays;
             // Few patches make the estimate itself uncertain, and stopping when it happens to be low would favour that.
-            let error = self.error(tracer.patches, tracer.optics) * (1.0 + 1.5 / (lit.max(1) as f64).sqrt());
+            let error = self.error(tracer.patches, tracer.optics) * (1.0 + 1.5 / lit.max(1.0).sqrt());
             if error <= target || progress.stopped() {
                 return Ok(());
             }
@@ -269,7 +278,7 @@ impl Average {
         progress: &Progress,
     ) -> Result<()> {
         let weight = rays as f64;
-        for half in 0..2 {
+        let solution = |half: usize, progress: &Progress| {
             let stream = |what: u32| sampling::hash_all(&[params.seed, round, half as u32, what]);
             let mut run = match gathered {
                 Some(gathered) => {
@@ -285,11 +294,16 @@ impl Average {
                 }
                 None => {
                     let light = emit::shoot_all(tracer, rays / 2, stream(0));
-                    self.shots += light.shots;
-                    Run::new(tracer, light.incident, light.flux, light.tally, stream(1))
+                    let mut run = Run::new(tracer, light.incident, light.flux, light.tally, stream(1));
+                    run.shots += light.shots;
+                    run
                 }
             };
-            run.refine(rays / 2, params.unshot, progress)?;
+            run.refine(rays / 2, params.unshot, progress).map(|()| run)
+        };
+        // Side by side: what one does alone, between batches of perhaps few rays, does not keep all threads waiting.
+        let (first, second) = rayon::join(|| solution(0, progress), || solution(1, &progress.quietly()));
+        for (half, run) in [first?, second?].into_iter().enumerate() {
             for (sum, flux) in self.sums[half].iter_mut().zip(run.incident(params.ambient)) {
                 *sum += weight * flux;
             }
@@ -337,7 +351,7 @@ impl Average {
             patches: patches.len(),
             patch_size: patches.size as f32,
             map: patches.map,
-            normals: patches.normals,
+            normals: patches.planes.iter().map(|plane| plane.normal).collect(),
             rays: self.rays,
             shots: self.shots,
             error,

@@ -35,7 +35,16 @@ impl Optics {
     /// # Errors
     /// [`Error::Unsolvable`] when a surface reflects more than it receives, or less than nothing.
     pub fn new(input: &RadiosityScene<'_>, patches: &Patches) -> Result<Optics> {
-        let means: Vec<Mean> = (0..patches.len() as u32).into_par_iter().map(|p| mean(input, patches, p)).collect();
+        // A material that is the same everywhere is looked at on the first patch that has it.
+        let mut looked_at = vec![None; input.scene.materials.len()];
+        for patch in 0..patches.len() as u32 {
+            if let Some(material) = even_material(input, patches, patch) {
+                looked_at[material].get_or_insert_with(|| mean(input, patches, patch));
+            }
+        }
+        let known = |patch: u32| even_material(input, patches, patch).and_then(|material| looked_at[material]);
+        let look = |patch: u32| known(patch).unwrap_or_else(|| mean(input, patches, patch));
+        let means: Vec<Mean> = (0..patches.len() as u32).into_par_iter().map(look).collect();
         let mut optics = Optics {
             reflectance: Vec::with_capacity(means.len()),
             emission: Vec::new(),
@@ -89,6 +98,13 @@ struct Mean {
     reflectance: Vec3,
     radiance: Vec3,
     specular: bool,
+}
+
+/// The material of a patch of the scene, where no texture or vertex colour changes it.
+fn even_material(input: &RadiosityScene<'_>, patches: &Patches, patch: u32) -> Option<usize> {
+    let TriangleSource::Scene { triangle } = source(input, patches, patch) else { return None };
+    let even = input.scene.mesh.colors.is_empty() && material(input.scene, triangle).texture_slots().next().is_none();
+    even.then(|| input.scene.mesh.object(triangle).material as usize)
 }
 
 fn mean(input: &RadiosityScene<'_>, patches: &Patches, patch: u32) -> Mean {

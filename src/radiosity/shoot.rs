@@ -15,10 +15,10 @@ use crate::sampling;
 use crate::shading::{Bsdf, Lobes, SurfacePoint};
 use crate::simplify::TriangleSource;
 
-/// Rays traced in one call of the backend.
-const CHUNK: u64 = 4096;
+/// Rays traced in one call of the backend. What a chunk deposits fits into memory that an allocator keeps at hand.
+const CHUNK: u64 = 1024;
 /// Chunks whose deposits are kept until they are added up in order.
-const GROUP: u64 = 64;
+const GROUP: u64 = 256;
 /// Specular reflections after which a photon is given up.
 const MAX_CHAIN: usize = 32;
 /// Weight under which photons go on only with proportional probability.
@@ -221,7 +221,7 @@ impl Tracer<'_> {
                 }
                 let patch = self.patches.map.at(hit.triangle, hit.u, hit.v);
                 if counts {
-                    let front = ray.direction.dot(self.patches.normals[hit.triangle as usize]) < 0.0;
+                    let front = ray.direction.dot(self.patches.planes[hit.triangle as usize].normal) < 0.0;
                     output.deposits.push((2 * patch + u32::from(!front), load.flux));
                 }
                 if self.optics.specular[patch as usize]

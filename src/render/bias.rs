@@ -7,6 +7,7 @@
 use rayon::prelude::*;
 
 use super::RenderParams;
+use super::caustics::Caustics;
 use super::integrator::World;
 use super::path::Path;
 use super::workspace::Workspace;
@@ -51,7 +52,10 @@ impl Bias {
 pub fn measure(world: &World<'_>, camera: &Camera, params: &RenderParams, samples: u32) -> Bias {
     let view = View::new(camera, params);
     let gather_lobes = Lobes { least_roughness: 0.0, ..world.gather_lobes };
-    let reference = World { far: None, gather_lobes, ..*world };
+    let reference = World { far: None, caustics: None, gather_lobes, ..*world };
+    // Caustics of lights without area are not to be had by path tracing.
+    let caustics = world.caustics.map(Caustics::of_areas_only);
+    let world = &World { caustics: caustics.as_ref(), ..*world };
     let batches: Vec<Sums> = (0..samples.div_ceil(BATCH))
         .into_par_iter()
         .map_init(Workspace::default, |ws, batch| {
@@ -60,9 +64,11 @@ pub fn measure(world: &World<'_>, camera: &Camera, params: &RenderParams, sample
             let stream = hash_all(&[params.seed, STREAM, batch]);
             let views: Vec<Path> = (0..count).map(|i| view.path(i, stream)).collect();
             let gathers: Vec<Path> = world.first_gathers(ws, &views).into_iter().map(|c| c.path).collect();
+            let of_photons = ws.lores.clone();
             // With a cache only the point is shared
             let start = if world.cache.is_some() { &views } else { &gathers };
-            let with_far = world.gather(ws, start, count as usize).to_vec();
+            let mut with_far = world.gather(ws, start, count as usize).to_vec();
+            with_far.iter_mut().zip(of_photons).for_each(|(sum, photons)| *sum += photons);
             // Other random numbers than the first path's: only the first point and direction are shared.
             let detailed: Vec<Path> = gathers
                 .iter()

@@ -6,7 +6,7 @@
 use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -30,6 +30,34 @@ const QUOTED: usize = 48;
 /// What a rendering is of: names and values of all that its pixels depend on.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Identity(pub Vec<(String, String)>);
+
+/// An identity that is found out when it is first asked for: hashing program and scene takes as long as a small image.
+#[derive(Clone)]
+pub struct LateIdentity(Arc<Late>);
+
+struct Late {
+    found: OnceLock<Identity>,
+    find: Box<dyn Fn() -> Result<Identity> + Send + Sync>,
+}
+
+impl LateIdentity {
+    /// The one that `find` finds.
+    pub fn new(find: impl Fn() -> Result<Identity> + Send + Sync + 'static) -> Self {
+        LateIdentity(Arc::new(Late { found: OnceLock::new(), find: Box::new(find) }))
+    }
+
+    /// The identity.
+    ///
+    /// # Errors
+    /// Those of finding it.
+    pub fn get(&self) -> Result<&Identity> {
+        let Late { found, find } = &*self.0;
+        match found.get() {
+            Some(identity) => Ok(identity),
+            None => find().map(|identity| found.get_or_init(|| identity)),
+        }
+    }
+}
 
 impl Identity {
     /// How `other` differs, as a part of a sentence; `None` when it does not.
@@ -301,6 +329,7 @@ mod tests {
             region: Some(Region { low: [0, 0], high: [8, 2] }),
             min_trials: 4,
             max_trials: 64,
+            error: 0.1,
             hires_error: 0.1,
             lores_error: 0.1,
             time_limit: None,

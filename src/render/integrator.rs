@@ -10,7 +10,8 @@
 //! | `L_{l,l}` beyond `r_thresh` | `E S* D .. D` | LORES: radiosity less emission of the patch that is hit, Eq. (3) first part |
 //! | `L_{l,l}` within `r_thresh` | `E S* D D ..` | LORES: direct light at the near point and the same gather again, Eq. (3) second part |
 //! | `L_{l,h}` | `E S* D S+ D ..` | LORES: the gather ray goes on through mirrors and glass |
-//! | `L_{l,c}` | `E S* D S+ L` | LORES: emission met after at least one highly directional event |
+//! | `L_{l,c}` from small light sources | `E S* D S+ L` | HIRES: photons; LORES where gather rays meet the `D` (see [`caustics`](super::caustics)) |
+//! | `L_{l,c}` from large ones | `E S* D S+ L` | LORES: emission met after at least one highly directional event |
 //!
 //! L is a light source or the environment. Light that passes straight through panes counts as direct (`L_{l,s}`): shadow rays
 //! take the panes' transmittance.
@@ -21,6 +22,7 @@ use std::time::Instant;
 use glam::Vec3;
 
 use super::cache::IrradianceCache;
+use super::caustics::Caustics;
 use super::film::{Feature, Tile};
 use super::nearness::Nearness;
 use super::path::{Arrival, Met, Passes, Path, Shadow};
@@ -80,6 +82,8 @@ pub struct World<'a> {
     pub gather_lobes: Lobes,
     /// Indirect light of diffuse surfaces that the camera sees, where it is not gathered by each path.
     pub cache: Option<&'a IrradianceCache>,
+    /// Photons from small light sources; without any, gather rays must meet all light sources.
+    pub caustics: Option<&'a Caustics>,
     /// Scattering events after which paths end.
     pub max_depth: u32,
 }
@@ -232,7 +236,7 @@ impl<'a> World<'a> {
             ws.shadows.clear();
             ws.shadow_rays.clear();
             self.trace_detailed(ws, passes, coherence, &mut capture);
-            self.trace_far(ws, passes, &mut capture);
+            self.trace_far(ws, passes, coherence, &mut capture);
             self.trace_shadows(ws, coherence);
             std::mem::swap(&mut ws.paths, &mut ws.next);
             let view = coherence == Coherence::Coherent && passes.hires;
@@ -288,7 +292,13 @@ impl<'a> World<'a> {
     }
 
     /// Traces the far list in the simplified scene and looks radiosities up.
-    fn trace_far(&self, ws: &mut Workspace, passes: Passes, capture: &mut Option<&mut Vec<Captured>>) {
+    fn trace_far(
+        &self,
+        ws: &mut Workspace,
+        passes: Passes,
+        coherence: Coherence,
+        capture: &mut Option<&mut Vec<Captured>>,
+    ) {
         let Some(far) = self.far else { return };
         if ws.far.is_empty() {
             return;
@@ -296,7 +306,7 @@ impl<'a> World<'a> {
         ws.rays.clear();
         ws.rays.extend(ws.far.iter().map(|&i| ws.paths[i as usize].ray));
         ws.hits.resize(ws.rays.len(), Hit::MISS);
-        far.rays.closest(&ws.rays, Visible::All, Coherence::Incoherent, &mut ws.hits);
+        far.rays.closest(&ws.rays, Visible::All, coherence, &mut ws.hits);
         settle_edges(far.rays, &mut ws.rays, &mut ws.hits);
         ws.counts.far += ws.rays.len() as u64;
         for k in 0..ws.far.len() {
@@ -448,8 +458,20 @@ impl<'a> World<'a> {
             return;
         }
 
+        // What remains of the point where photons bring the light that the rest of it bends.
+        let unbending = match self.caustics {
+            Some(caustics) if path.gathers => caustics.unbending(self.scene, point, outgoing),
+            _ => None,
+        };
         if let Some(light) = light {
-            shine(ws, &path, point, &bsdf, light);
+            shine(ws, &path, point, self.scattered(&bsdf, unbending.as_ref(), light), light);
+        }
+        let wanted = if path.gathers { passes.lores } else { passes.hires || capture.is_some() };
+        if let Some(caustics) = self.caustics.filter(|_| wanted && look_up.is_none()) {
+            let radiance = path.throughput * caustics.at(point, outgoing, &bsdf, unbending.as_ref(), path.gathers);
+            // To those who take paths over, what photons bring is indirect light like what paths will bring.
+            let sum = if path.gathers || capture.is_some() { &mut ws.lores[trial] } else { &mut ws.hires[trial] };
+            *sum += radiance;
         }
 
         // Share of paths that gather the rest when the diffuse part came from the cache.
@@ -461,7 +483,7 @@ impl<'a> World<'a> {
             && let Some(cache) = self.cache
             && let diffuse = bsdf.albedo_diffuse()
             && diffuse != Vec3::ZERO
-            && let Some(light) = cache.look_up(point.position, facing)
+            && let Some(light) = cache.look_up(&mut ws.nearby, ws.cone[0] + ws.cone[1] * hit.t, point.position, facing)
         {
             ws.lores[trial] += path.throughput * diffuse * light;
             low = bsdf.albedo_rough();
@@ -484,6 +506,7 @@ impl<'a> World<'a> {
                 throughput: path.throughput * sample.weight / choose_high,
                 near: if path.near.is_finite() { (path.near - hit.t).max(0.0) } else { path.near },
                 arrival,
+                bent: if sample.straight { path.bent } else { unbending.is_some() },
                 depth: path.depth + 1,
                 ..path
             };
@@ -512,6 +535,7 @@ impl<'a> World<'a> {
             near: f32::INFINITY,
             arrival: Arrival::Soft,
             gathers: true,
+            bent: false,
             depth: path.depth + 1,
             ..path
         };
@@ -528,8 +552,24 @@ impl<'a> World<'a> {
         }
     }
 
+    /// `f cos` for a sampled light source. What bends light is left to photons where they carry the light; rays from glossy lobes have
+    /// a share in their light.
+    fn scattered(&self, bsdf: &Bsdf, unbending: Option<&Bsdf>, light: &LightSample) -> Vec3 {
+        if let (Some(unbending), Some(caustics)) = (unbending, self.caustics)
+            && caustics.carry(light)
+        {
+            return unbending.eval_low(light.direction);
+        }
+        let (high, high_pdf) = bsdf.eval_high(light.direction);
+        let high_share = light.pdf.map_or(1.0, |pdf| pdf / (pdf + high_pdf));
+        bsdf.eval_low(light.direction) + high * high_share
+    }
+
     /// Share of met emission that counts: the rest is next-event estimation's at the start of the ray.
     fn emission_share(&self, path: &Path, hit: &Hit) -> f32 {
+        if path.bent && self.caustics.is_some_and(|c| c.carry_from(hit.triangle)) {
+            return 0.0;
+        }
         match path.arrival {
             Arrival::Sharp => 1.0,
             Arrival::Soft => 0.0,
@@ -559,11 +599,8 @@ impl<'a> World<'a> {
     }
 }
 
-/// Next-event estimation: a shadow ray to a sampled light source.
-fn shine(ws: &mut Workspace, path: &Path, point: &SurfacePoint, bsdf: &Bsdf, light: &LightSample) {
-    let (high, high_pdf) = bsdf.eval_high(light.direction);
-    let high_share = light.pdf.map_or(1.0, |pdf| pdf / (pdf + high_pdf));
-    let scattered = bsdf.eval_low(light.direction) + high * high_share;
+/// Next-event estimation: a shadow ray to a sampled light source, whose light is `scattered` (`f cos`).
+fn shine(ws: &mut Workspace, path: &Path, point: &SurfacePoint, scattered: Vec3, light: &LightSample) {
     let radiance = path.throughput * scattered * light.weight;
     if radiance == Vec3::ZERO {
         return;

@@ -2,6 +2,7 @@
 
 pub mod bias;
 pub mod cache;
+pub mod caustics;
 pub mod checkpoint;
 pub mod film;
 pub mod integrator;
@@ -21,6 +22,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 pub use cache::IrradianceCache;
+pub use caustics::Caustics;
 pub use film::{Film, Region};
 pub use integrator::{FarField, World};
 pub use nearness::Nearness;
@@ -56,6 +58,9 @@ pub struct RenderParams {
     pub min_trials: u32,
     /// Most trials of a pixel in each pass; equal to `min_trials` for fixed sampling.
     pub max_trials: u32,
+    /// Relative standard error of the image that trials are planned for: the root of the mean over pixels of its square. Infinite for
+    /// none.
+    pub error: f32,
     /// Relative standard error of a pixel at which HIRES stops.
     pub hires_error: f32,
     /// Relative standard error of a pixel, both passes together, at which LORES stops.
@@ -131,8 +136,7 @@ pub fn render_rounds(
 ) {
     let over = || progress.stopped();
     let mut cache = IrradianceCache::default();
-    let size = [params.width, params.height];
-    if wants_cache(world, params) && !cache.fill(world, camera, size, params.seed, &over, &mut |_| {}) {
+    if wants_cache(world, params) && !cache.fill(world, camera, params, &over, &mut |_| {}) {
         return;
     }
     let world = &World { cache: wants_cache(world, params).then_some(&cache).or(world.cache), ..*world };

@@ -16,29 +16,26 @@ pub struct Nearness {
     origin: Vec3,
     inverse_cell: f32,
     size: UVec3,
-    marked: Vec<bool>,
+    /// One bit a cell, one word a row along x; rows by y, then z.
+    rows: Vec<u128>,
 }
+
+// A row fits into a word.
+const _: () = assert!(CELLS < u128::BITS);
 
 impl Nearness {
     /// Marks every cell that holds a point closer than `reach` to one of `different`.
     pub fn new(bounds: Aabb, different: impl IntoIterator<Item = Aabb>, reach: f32) -> Self {
         let cell = (bounds.size().max_element() / CELLS as f32).max(f32::MIN_POSITIVE);
         let size = ((bounds.size() / cell).as_uvec3() + 1).clamp(UVec3::ONE, UVec3::splat(CELLS + 1));
-        let mut grid = Nearness {
-            origin: bounds.min,
-            inverse_cell: 1.0 / cell,
-            size,
-            marked: vec![false; (size.x * size.y * size.z) as usize],
-        };
+        let mut grid =
+            Nearness { origin: bounds.min, inverse_cell: 1.0 / cell, size, rows: vec![0; (size.y * size.z) as usize] };
         for b in different {
             grid.mark(b);
         }
         // One cell more than the reach covers points anywhere in the cells of both ends.
         let cells = (reach * grid.inverse_cell).ceil() as i64 + 1;
-        let cells = cells.clamp(1, i64::from(CELLS) + 1) as usize;
-        for axis in 0..3 {
-            grid.dilate(axis, cells);
-        }
+        grid.dilate(cells.clamp(1, i64::from(CELLS) + 1) as usize);
         grid
     }
 
@@ -48,16 +45,18 @@ impl Nearness {
         if c.cmplt(Vec3::ZERO).any() || c.cmpge(self.size.as_vec3()).any() {
             return true;
         }
-        self.marked[self.index(c.as_uvec3())]
+        let c = c.as_uvec3();
+        self.rows[self.row(c.y, c.z)] >> c.x & 1 == 1
     }
 
     /// Share of cells that are marked, 0..=1.
     pub fn share(&self) -> f64 {
-        self.marked.iter().filter(|m| **m).count() as f64 / self.marked.len() as f64
+        let marked: u32 = self.rows.iter().map(|row| row.count_ones()).sum();
+        f64::from(marked) / f64::from(self.size.element_product())
     }
 
-    fn index(&self, c: UVec3) -> usize {
-        ((c.z * self.size.y + c.y) * self.size.x + c.x) as usize
+    fn row(&self, y: u32, z: u32) -> usize {
+        (z * self.size.y + y) as usize
     }
 
     fn mark(&mut self, b: Aabb) {
@@ -66,33 +65,43 @@ impl Nearness {
         let high = ((b.max - self.origin) * self.inverse_cell).floor().as_ivec3().clamp(IVec3::ZERO, limit).as_uvec3();
         for z in low.z..=high.z {
             for y in low.y..=high.y {
-                let row = self.index(UVec3::new(0, y, z));
-                self.marked[row + low.x as usize..=row + high.x as usize].fill(true);
+                let row = self.row(y, z);
+                self.rows[row] |= first_bits(high.x + 1) & !first_bits(low.x);
             }
         }
     }
 
-    /// Grows the marks by `cells` both ways along one axis; three of these make a dilation by a box.
-    fn dilate(&mut self, axis: usize, cells: usize) {
-        let size = self.size.to_array().map(|s| s as usize);
-        let stride = [1, size[0], size[0] * size[1]];
-        let (a, b) = ((axis + 1) % 3, (axis + 2) % 3);
-        let mut line = vec![false; size[axis]];
-        for i in 0..size[a] {
-            for j in 0..size[b] {
-                let start = i * stride[a] + j * stride[b];
-                line.fill(false);
-                for k in 0..size[axis] {
-                    if self.marked[start + k * stride[axis]] {
-                        line[k.saturating_sub(cells)..(k + cells + 1).min(size[axis])].fill(true);
-                    }
-                }
-                for (k, m) in line.iter().enumerate() {
-                    self.marked[start + k * stride[axis]] = *m;
-                }
+    /// Grows the marks by `cells` both ways along each axis: a dilation by a box.
+    fn dilate(&mut self, cells: usize) {
+        let within = first_bits(self.size.x);
+        for row in self.rows.iter_mut().filter(|row| **row != 0) {
+            for _ in 0..cells {
+                *row |= (*row << 1 | *row >> 1) & within;
             }
         }
+        let [_, ny, nz] = self.size.to_array().map(|n| n as usize);
+        let along_y = |i: usize| (i % ny, ny, 1);
+        self.spread(cells, along_y);
+        let along_z = |i: usize| (i / ny, nz, ny);
+        self.spread(cells, along_z);
     }
+
+    /// Joins each row with those up to `cells` before and behind it. `line` gives a row's place in its line, the line's length and the
+    /// distance from one row of it to the next.
+    fn spread(&mut self, cells: usize, line: impl Fn(usize) -> (usize, usize, usize)) {
+        let before = self.rows.clone();
+        for (i, row) in self.rows.iter_mut().enumerate() {
+            let (at, length, stride) = line(i);
+            let (first, last) = (at.saturating_sub(cells), (at + cells).min(length - 1));
+            let start = i - at * stride;
+            *row = (first..=last).fold(0, |sum, k| sum | before[start + k * stride]);
+        }
+    }
+}
+
+/// A word with the `n` lowest bits set, `n` up to 128.
+fn first_bits(n: u32) -> u128 {
+    1u128.checked_shl(n).map_or(u128::MAX, |bit| bit - 1)
 }
 
 #[cfg(test)]

@@ -59,6 +59,8 @@ pub struct Path {
     pub arrival: Arrival,
     /// Whether a weakly directional bounce lies behind: the path belongs to LORES.
     pub gathers: bool,
+    /// Whether the last event since then bent light in a way that photons follow, too (see [`caustics`](super::caustics)).
+    pub bent: bool,
     /// Scattering events so far.
     pub depth: u32,
     /// Index of the trial in its batch.
@@ -78,6 +80,7 @@ impl Path {
             near: f32::INFINITY,
             arrival: Arrival::Sharp,
             gathers: false,
+            bent: false,
             depth: 0,
             trial,
             index,

@@ -47,7 +47,7 @@ pub(super) fn fill_cache(
         session.filling = before;
         session.filling += start.spent();
     };
-    let complete = cache.fill(world, camera, [params.width, params.height], params.seed, over, &mut |cache| {
+    let complete = cache.fill(world, camera, params, over, &mut |cache| {
         if let Some(watcher) = watcher.as_deref_mut().filter(|w| w.wait().is_zero()) {
             keep(session, cache);
             watcher.look(session, Moment::Meanwhile);

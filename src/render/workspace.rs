@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use super::cache::Nearby;
 use super::film::Feature;
 use super::path::{Met, Path, Shadow};
 use super::tally::{PassTimes, RayCounts};
@@ -33,6 +34,8 @@ pub struct Workspace {
     pub(super) features: Vec<Feature>,
     /// How far each trial's first ray went; empty when nobody wants to know.
     pub(super) distances: Vec<f32>,
+    /// What the irradiance cache says around the points of this batch.
+    pub(super) nearby: Nearby,
     /// Width of a pixel at the start of view rays and its growth over distance; zero reads textures at their full resolution.
     pub(super) cone: [f32; 2],
     /// Rays traced since this was last reset.
@@ -76,6 +79,7 @@ impl Workspace {
         self.paths.clear();
         self.features.clear();
         self.distances.clear();
+        self.nearby.clear();
         self.cone = [0.0; 2];
         for sums in [&mut self.hires, &mut self.lores] {
             sums.clear();

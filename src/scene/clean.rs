@@ -18,7 +18,7 @@ enum Flaw {
 /// materials that emit.
 pub(super) fn clean(mesh: &mut Mesh, emits: &[bool], notes: &mut ImportNotes) {
     let mut flaws: Vec<Flaw> = mesh.triangles.par_iter().map(|&t| flaw(mesh, t)).collect();
-    mark_duplicates(mesh, emits, &mut flaws, notes);
+    let shared = mark_duplicates(mesh, emits, &mut flaws, notes);
     if let Some(t) = flaws.iter().position(|&f| f == Flaw::NotFinite) {
         notes.non_finite_triangles = flaws.iter().filter(|&&f| f == Flaw::NotFinite).count();
         notes.warn(format!(
@@ -30,7 +30,7 @@ pub(super) fn clean(mesh: &mut Mesh, emits: &[bool], notes: &mut ImportNotes) {
     notes.degenerate_triangles = flaws.iter().filter(|&&f| f == Flaw::Degenerate).count();
     notes.duplicate_triangles = flaws.iter().filter(|&&f| f == Flaw::Duplicate).count();
     if flaws.iter().any(|&f| f != Flaw::None) {
-        compact(mesh, &flaws);
+        compact(mesh, &flaws, &shared);
     }
     mesh.positions.par_iter_mut().filter(|p| !p.is_finite()).for_each(|p| *p = Vec3::ZERO);
     mesh.measure();
@@ -50,8 +50,9 @@ fn flaw(mesh: &Mesh, triangle: [u32; 3]) -> Flaw {
     if height > extent * 2.0_f64.powi(-23) { Flaw::None } else { Flaw::Degenerate }
 }
 
-/// Marks triangles with the same three corners as another; of those, the first that emits stays, else the first.
-fn mark_duplicates(mesh: &Mesh, emits: &[bool], flaws: &mut [Flaw], notes: &mut ImportNotes) {
+/// Marks triangles with the same three corners as another; of those, the first that emits stays, else the first. Gives each that
+/// stays with an object that lost one to it.
+fn mark_duplicates(mesh: &Mesh, emits: &[bool], flaws: &mut [Flaw], notes: &mut ImportNotes) -> Vec<(u32, u32)> {
     let key = |t: u32| {
         let mut corners = mesh.corners(t).map(|p| (p + Vec3::ZERO).to_array().map(f32::to_bits)); // -0 is 0
         corners.sort_unstable();
@@ -70,6 +71,7 @@ fn mark_duplicates(mesh: &Mesh, emits: &[bool], flaws: &mut [Flaw], notes: &mut 
         .collect();
     hashes.par_sort_unstable();
     let mut first = None;
+    let mut shared = Vec::new();
     for run in hashes.chunk_by(|a, b| a.0 == b.0).filter(|run| run.len() > 1) {
         let mut run: Vec<_> = run.iter().map(|&(_, t)| (key(t), t)).collect();
         run.sort_unstable();
@@ -78,6 +80,10 @@ fn mark_duplicates(mesh: &Mesh, emits: &[bool], flaws: &mut [Flaw], notes: &mut 
             let keep = emitter.unwrap_or(&same[0]).1;
             for &(_, t) in same.iter().filter(|(_, t)| *t != keep) {
                 flaws[t as usize] = Flaw::Duplicate;
+                let (owner, loser) = (mesh.object_of_triangle[keep as usize], mesh.object_of_triangle[t as usize]);
+                if owner != loser {
+                    shared.push((keep, loser));
+                }
                 first = first.min(Some((t, keep))).or(Some((t, keep)));
             }
         }
@@ -88,20 +94,25 @@ fn mark_duplicates(mesh: &Mesh, emits: &[bool], flaws: &mut [Flaw], notes: &mut 
             "some triangles lie exactly on others and were dropped, the first in '{dropped}' on '{kept}'"
         ));
     }
+    shared
 }
 
-fn compact(mesh: &mut Mesh, flaws: &[Flaw]) {
+fn compact(mesh: &mut Mesh, flaws: &[Flaw], shared: &[(u32, u32)]) {
+    const GONE: u32 = u32::MAX;
     let triangles = std::mem::take(&mut mesh.triangles);
     let mut kept = Vec::with_capacity(triangles.len());
     let mut owners = Vec::with_capacity(triangles.len());
     let mut objects = Vec::with_capacity(mesh.objects.len());
-    for mut object in std::mem::take(&mut mesh.objects) {
+    let (mut new_triangle, mut new_object) = (vec![GONE; triangles.len()], vec![GONE; mesh.objects.len()]);
+    for (old, mut object) in std::mem::take(&mut mesh.objects).into_iter().enumerate() {
         let first = kept.len();
         for t in object.triangles.clone().map(|t| t as usize).filter(|&t| flaws[t] == Flaw::None) {
+            new_triangle[t] = kept.len() as u32;
             kept.push(triangles[t]);
             owners.push(objects.len() as u32);
         }
         if kept.len() > first {
+            new_object[old] = objects.len() as u32;
             object.triangles = first as u32..kept.len() as u32;
             objects.push(object);
         }
@@ -109,4 +120,7 @@ fn compact(mesh: &mut Mesh, flaws: &[Flaw]) {
     mesh.triangles = kept;
     mesh.object_of_triangle = owners;
     mesh.objects = objects;
+    let renumbered = shared.iter().map(|&(t, object)| (new_triangle[t as usize], new_object[object as usize]));
+    mesh.shared = renumbered.filter(|&(_, object)| object != GONE).collect();
+    mesh.shared.sort_unstable();
 }

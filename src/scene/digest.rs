@@ -47,6 +47,7 @@ impl Scene {
         }
         // Debug output names every field and gives floats with all their digits: no field can be forgotten here.
         write_debug(&mut hasher, &mesh.objects);
+        write_debug(&mut hasher, &mesh.shared);
         write_debug(&mut hasher, &self.materials);
         hasher.finalize()
     }

@@ -159,6 +159,7 @@ fn assemble(builder: &SceneBuilder, centre: DVec3) -> Mesh {
         object_of_triangle: vec![0; triangles],
         planes: Vec::new(),
         objects: Vec::with_capacity(order.len()),
+        shared: Vec::new(),
         bounds: Aabb::EMPTY,
     };
     let [uv0, uv1] = &mut mesh.uvs;

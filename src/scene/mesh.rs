@@ -31,6 +31,8 @@ pub struct Mesh {
     pub planes: Vec<Plane>,
     /// The objects, in the order of their triangles.
     pub objects: Vec<Object>,
+    /// Triangles that another object had as well (where two blocks touch), each with that object: it lost its own.
+    pub shared: Vec<(u32, u32)>,
     /// Bounds of all triangles.
     pub bounds: Aabb,
 }

@@ -95,6 +95,19 @@ fn of_two_equal_triangles_the_emitter_stays() {
     let scene = build(&[(square(), grey(), at(0.0, 0.0, 0.0)), (square(), lamp, at(0.0, 0.0, 0.0))]);
     assert_eq!(scene.mesh.triangles.len(), 2);
     assert!((0..2).all(|t| scene.material(t).is_emitter()));
+    assert!(scene.mesh.shared.is_empty(), "the other object is gone");
+}
+
+#[test]
+fn what_an_object_loses_to_another_is_noted() {
+    let above = (square(), grey(), at(0.0, 0.0, 1.0));
+    let mut both = MeshData { uvs: Default::default(), ..square() };
+    both.positions.extend(square().positions);
+    both.positions[4..].iter_mut().for_each(|p| p.z = 1.0);
+    both.triangles.extend(square().triangles.into_iter().map(|t| t.map(|i| i + 4)));
+    let scene = build(&[above, (both, grey(), at(0.0, 0.0, 0.0))]);
+    assert_eq!((scene.mesh.triangles.len(), scene.mesh.objects.len()), (4, 2));
+    assert_eq!(scene.mesh.shared, [(0, 1), (1, 1)]);
 }
 
 #[test]

@@ -84,8 +84,12 @@ impl SurfacePoint {
     /// The point at `u`, `v` of a triangle with the given corners, which need not belong to a scene: flat, without texture
     /// coordinates. `triangle` is only stored.
     pub fn flat(corners: [Vec3; 3], triangle: u32, u: f32, v: f32) -> Self {
-        let plane = Plane::of(corners);
-        let (position, error) = locate(corners, &plane, u, v);
+        Self::on_plane(corners, &Plane::of(corners), triangle, u, v)
+    }
+
+    /// As [`SurfacePoint::flat`], with the plane of the corners known.
+    pub fn on_plane(corners: [Vec3; 3], plane: &Plane, triangle: u32, u: f32, v: f32) -> Self {
+        let (position, error) = locate(corners, plane, u, v);
         SurfacePoint {
             position,
             error,

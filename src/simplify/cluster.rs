@@ -150,7 +150,8 @@ pub fn find_clusters(mesh: &Mesh, map: &SurfaceMap, small: &[u32], extent: Exten
     groups
 }
 
-/// Surfaces that share vertices (the sides of one pencil) make one group, where it is not too large.
+/// Surfaces that share vertices (the sides of one pencil) make one group, where it is not too large, else those of one object
+/// do (each of the blocks of a wall), else each is one.
 fn connected(mesh: &Mesh, map: &SurfaceMap, small: &[u32], limit: f32) -> Vec<Group> {
     const NONE: u32 = u32::MAX;
     let mut position = vec![NONE; map.surfaces.len()];
@@ -186,10 +187,24 @@ fn connected(mesh: &Mesh, map: &SurfaceMap, small: &[u32], limit: f32) -> Vec<Gr
         if group.bounds.diagonal() <= limit {
             groups.push(group);
         } else {
-            groups.extend(group.surfaces().into_iter().map(|s| Group::of(vec![s], &map.surfaces)));
+            groups.extend(by_object(&group.surfaces(), &map.surfaces, limit));
         }
     }
     groups
+}
+
+/// One group for each object among `members` (ascending) where it is not too large, else one for each surface.
+fn by_object(members: &[u32], surfaces: &[Surface], limit: f32) -> Vec<Group> {
+    let object = |s: &u32| surfaces[*s as usize].object;
+    let groups = members.chunk_by(|a, b| object(a) == object(b)).flat_map(|own| {
+        let whole = Group::of(own.to_vec(), surfaces);
+        if whole.bounds.diagonal() <= limit {
+            vec![whole]
+        } else {
+            own.iter().map(|&s| Group::of(vec![s], surfaces)).collect()
+        }
+    });
+    groups.collect()
 }
 
 fn morton_sort(groups: &mut [Group], shift: f32) {

@@ -16,12 +16,12 @@ use crate::backend::{RayBackend, RayScene};
 use crate::error::Result;
 use crate::progress::Progress;
 use crate::sampling;
-use crate::scene::Scene;
+use crate::scene::{Aabb, Scene};
 
 /// Lines for all fits together, for each triangle of the scene and at least: what keeps simplification under two seconds per
 /// million triangles.
 const LINES_PER_TRIANGLE: usize = 1;
-const LEAST_BUDGET: usize = 1 << 19;
+const LEAST_BUDGET: usize = 1 << 17;
 
 /// Most lines for one fit; `sampling::sobol` has as many points in a stream.
 const MOST_LINES: u32 = 1 << 15;
@@ -139,7 +139,7 @@ impl Replacer<'_> {
         Ok(fitted)
     }
 
-    /// Triangles of each group, ascending.
+    /// Triangles of each group, ascending, with those that its objects share with others: they close it, whosever they are.
     fn triangles_of(&self, groups: &[Group]) -> Vec<Vec<u32>> {
         const NONE: u32 = u32::MAX;
         let mut group_of = vec![NONE; self.surface_of_triangle.iter().max().map_or(0, |&m| m as usize + 1)];
@@ -153,7 +153,35 @@ impl Replacer<'_> {
                 triangles[group as usize].push(t);
             }
         }
+        self.add_shared(groups, &mut triangles);
         triangles
+    }
+
+    fn add_shared(&self, groups: &[Group], triangles: &mut [Vec<u32>]) {
+        let mesh = &self.scene.mesh;
+        if mesh.shared.is_empty() {
+            return;
+        }
+        let objects = |(i, own): (u32, &Vec<u32>)| {
+            own.iter().map(move |&t| (mesh.object_of_triangle[t as usize], i)).collect::<Vec<_>>()
+        };
+        let mut groups_of: Vec<(u32, u32)> = (0u32..).zip(&*triangles).flat_map(objects).collect();
+        groups_of.sort_unstable();
+        groups_of.dedup();
+        let mut lent = Vec::new();
+        for &(t, object) in &mesh.shared {
+            let first = groups_of.partition_point(|g| g.0 < object);
+            let inside = |bounds: Aabb| mesh.corners(t).into_iter().fold(bounds, Aabb::with) == bounds;
+            let around = groups_of[first..].iter().take_while(|g| g.0 == object).map(|g| g.1 as usize);
+            lent.extend(around.filter(|&i| inside(groups[i].bounds)).map(|i| (i, t)));
+        }
+        for &(i, t) in &lent {
+            triangles[i].push(t);
+        }
+        for (i, _) in lent {
+            triangles[i].sort_unstable();
+            triangles[i].dedup();
+        }
     }
 }
 

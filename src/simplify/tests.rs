@@ -97,6 +97,21 @@ fn limits_leave_everything_normal() {
 }
 
 #[test]
+fn any_threshold_leaves_walls_and_counts_everything_once() {
+    let scene = Arc::new(room(1, 0.5).grey(0.5, &leaves(400, 0.02, Vec3::splat(0.2), Vec3::splat(0.8), 5)).build());
+    for (r, beta) in
+        [(1e-6, 0.5), (0.01, 1.0), (0.1, 1.0), (0.3, 0.0), (0.3, 1.0), (1.0, 1.0), (3.0, 1.0), (1e20, 1e-30)]
+    {
+        let s = run(&scene, &params(r, beta));
+        assert!(is_normal(&s)[..6].iter().all(|&n| n), "r_thresh {r}, beta {beta}");
+        let clustered: usize = s.clusters.iter().map(|c| c.surfaces.len()).sum();
+        let others = s.surfaces.iter().filter(|s| s.class == Class::Normal || s.class.is_isolated()).count();
+        assert_eq!(clustered + others, s.surfaces.len());
+        assert!(s.geometry.positions.iter().all(|p| p.is_finite()));
+    }
+}
+
+#[test]
 fn hard_012_diced_walls_are_six_surfaces() {
     let s = run(&Arc::new(room(100, 0.5).build()), &params(0.1, PAPER_BETA));
     assert_eq!(s.surfaces.len(), 6);
@@ -376,9 +391,9 @@ fn long_dense_rows_are_one_cluster_and_long_sparse_ones_are_not() {
 }
 
 #[test]
-fn boxes_never_cover_a_light_source() {
-    // A lamp inside a ring of clutter, as in a shade.
-    let lamp = solid([0.49, 0.49, 0.49], [0.51, 0.51, 0.51]);
+fn boxes_never_cover_a_light_source_a_mirror_or_glass() {
+    // Something inside a ring of clutter, as in a shade.
+    let inner = solid([0.49, 0.49, 0.49], [0.51, 0.51, 0.51]);
     let around: Vec<_> = (0..40)
         .flat_map(|k| {
             let (sin, cos) = (k as f32 * 0.157).sin_cos();
@@ -386,11 +401,74 @@ fn boxes_never_cover_a_light_source() {
             solid(at.to_array(), (at + Vec3::new(0.005, 0.06, 0.005)).to_array())
         })
         .collect();
-    let scene = room(1, 0.5).object(Material::emitter(Vec3::ONE, Vec3::ZERO), &lamp).grey(0.5, &around).build();
-    let s = run(&Arc::new(scene), &params(0.25, 1e-4));
-    assert!(!s.clusters.is_empty());
     let middle = Aabb { min: Vec3::splat(0.49), max: Vec3::splat(0.51) };
-    assert!(s.clusters.iter().all(|c| !c.equivalent_box.bounds().overlaps(&middle)));
+    let covered = |material: Material| {
+        let scene = room(1, 0.5).object(material, &inner).grey(0.5, &around).build();
+        let s = run(&Arc::new(scene), &params(0.25, 1e-4));
+        assert!(!s.clusters.is_empty());
+        s.clusters.iter().any(|c| c.equivalent_box.bounds().overlaps(&middle))
+    };
+    assert!(!covered(Material::emitter(Vec3::ONE, Vec3::ZERO)));
+    assert!(!covered(Material { roughness: 0.0, ..Material::default() }));
+    assert!(!covered(Material { transmission: 1.0, ..Material::lambertian(Vec3::ONE) }));
+    assert!(covered(Material::lambertian(Vec3::ONE)), "nothing else is spared");
+}
+
+#[test]
+fn touching_blocks_are_as_solid_as_they_were_modelled() {
+    // A row longer than any cluster may be. Where two blocks touch the file's two faces are one, and the second block is open.
+    let side = 0.02;
+    let n = 40;
+    let mut builder = room(1, 0.5);
+    for k in 0..n {
+        let lo = Vec3::new(0.1 + side * k as f32, 0.3, 0.3);
+        let hi = Vec3::new(0.1 + side * (k + 1) as f32, 0.32, 0.32);
+        let closed = solid(lo.to_array(), hi.to_array());
+        builder = builder.grey(0.5, if k == 0 { &closed } else { &closed[2..] });
+    }
+    let mut scene = builder.build();
+    for k in 1..n {
+        let before = scene.mesh.objects[6 + k as usize - 1].triangles.clone();
+        // The last block's x+ follows its x-, where it has one.
+        let first = before.start + if k == 1 { 2 } else { 0 };
+        scene.mesh.shared.extend([(first, 6 + k), (first + 1, 6 + k)]);
+    }
+    let s = run(&Arc::new(scene), &params(0.1, 0.01));
+    assert!(
+        s.clusters.len() > 1 && s.clusters.iter().map(|c| c.surfaces.len()).sum::<usize>() == 6 + 5 * (n as usize - 1)
+    );
+    for c in &s.clusters {
+        assert_eq!(c.residual.hit_share, 1.0);
+        let off = 2.0 * c.equivalent_box.half - c.bounds.size();
+        assert!(
+            off.abs().max_element() < 1e-5 && (c.equivalent_box.centre - c.bounds.centre()).length() < 1e-5,
+            "{off}"
+        );
+    }
+}
+
+#[test]
+fn flat_clusters_become_thin_boxes() {
+    let scraps: Vec<_> = (0..100)
+        .flat_map(|k| {
+            let at = Vec3::new(0.4 + 0.011 * (k % 10) as f32, 0.5, 0.4 + 0.011 * (k / 10) as f32);
+            quad(at, Vec3::X * 0.01, Vec3::Z * 0.01)
+        })
+        .collect();
+    let scene = Arc::new(room(1, 0.5).grey(0.5, &scraps).build());
+    for box_fit in [BoxFit::Flux, BoxFit::Paper1993] {
+        let s = run(&scene, &SimplifyParams { box_fit, ..params(0.3, 5e-4) });
+        assert_eq!(s.clusters.len(), 1);
+        let [x, y, z] = (2.0 * s.clusters[0].equivalent_box.half).to_array();
+        assert!(y > 0.0 && y < 0.01 * x.min(z).max(0.02), "{x} {y} {z}");
+        assert!(s.geometry.positions.iter().all(|p| p.is_finite()));
+        if box_fit == BoxFit::Flux {
+            // Both sides of the scraps, 1 % of which the thickness may add.
+            assert!((x * z / 0.01 - 1.0).abs() < 0.05, "{x} {z}");
+        } else {
+            assert!(s.warnings.iter().any(|w| w.contains("vanished")), "{:?}", s.warnings);
+        }
+    }
 }
 
 #[test]
@@ -440,4 +518,11 @@ fn report_has_a_row_for_each_cluster() {
     let header = text.lines().next().unwrap();
     assert_eq!(text.lines().count(), rows.len() + 1);
     assert!(text.lines().all(|l| columns(l) == columns(header)) && columns(header) == 21);
+    let mut json = Vec::new();
+    report::write_json(&rows, &mut json).unwrap();
+    let read: Vec<serde_json::Value> = serde_json::from_slice(&json).unwrap();
+    assert_eq!(read.len(), rows.len());
+    assert!(
+        read.iter().zip(&rows).all(|(json, row)| json["surfaces"] == row.surfaces && json["edges"][2] == row.edges[2])
+    );
 }

@@ -232,26 +232,48 @@ fn gsii_013_emitting_clutter(case: &Case, out: &mut Outcome<'_>) {
     }
 }
 
-/// Shares of cosine-distributed rays from a point of the floor that clutter stops, and that its boxes stop.
-fn stopped(prepared: &Prepared, point: DVec3) -> [f64; 2] {
+/// What gather rays from the clutter that a camera sees meet: the shares that meet clutter nearby, that meet clutter only beyond the
+/// near part, and that meet a box there.
+fn gather_shares(prepared: &Prepared, camera: &gsii::scene::Camera, r_thresh: f32) -> [f64; 3] {
     const RAYS: u32 = 1 << 16;
     let scene = &prepared.scene;
-    let origin = (point + 1e-4 * DVec3::Z - scene.centre).as_vec3();
-    let rays: Vec<Ray> = (0..RAYS)
-        .map(|i| {
-            let u = sobol(i, 0, 12);
-            Ray::new(origin, cosine_hemisphere(Vec2::new(u[0], u[1])))
+    let far = prepared.far.as_ref().unwrap();
+    let trace = |rays_of: &dyn RayScene, rays: &[Ray]| {
+        let mut hits = vec![Hit::MISS; rays.len()];
+        rays_of.closest(rays, Visible::All, Coherence::Incoherent, &mut hits);
+        hits
+    };
+    let is_clutter = |hit: &Hit| hit.is_hit() && !scene.material(hit.triangle).is_emitter();
+    let u = |i: u32, d: u32| sobol(i, d, 12);
+    let views: Vec<Ray> = (0..RAYS).map(|i| camera.ray(Vec2::new(u(i, 0)[0], u(i, 0)[1]), 1.0)).collect();
+    let seen = trace(&*prepared.detailed, &views);
+    let gathers: Vec<Ray> = (0u32..)
+        .zip(views.iter().zip(&seen))
+        .filter(|(_, (_, hit))| is_clutter(hit))
+        .map(|(i, (view, hit))| {
+            let point = SurfacePoint::new(scene, hit);
+            let n = point.geometric_normal;
+            let normal = if n.dot(view.direction) < 0.0 { n } else { -n };
+            let direction = basis(normal) * cosine_hemisphere(Vec2::new(u(i, 1)[0], u(i, 1)[1]));
+            Ray { t_far: r_thresh * (0.5 + u(i, 1)[2]), ..Ray::new(point.ray_origin(direction), direction) }
         })
         .collect();
-    let far = prepared.far.as_ref().unwrap();
-    let is_clutter = |hit: &Hit| !scene.material(hit.triangle).is_emitter();
-    let is_box = |hit: &Hit| matches!(far.geometry.sources[hit.triangle as usize], TriangleSource::BoxFace { .. });
-    let share = |rays_of: &dyn RayScene, counts: &dyn Fn(&Hit) -> bool| {
-        let mut hits = vec![Hit::MISS; rays.len()];
-        rays_of.closest(&rays, Visible::All, Coherence::Incoherent, &mut hits);
-        hits.iter().filter(|hit| hit.is_hit() && counts(hit)).count() as f64 / f64::from(RAYS)
+    let near = trace(&*prepared.detailed, &gathers);
+    let beyond: Vec<Ray> = gathers
+        .iter()
+        .zip(&near)
+        .filter(|(_, hit)| !hit.is_hit())
+        .map(|(ray, _)| Ray { t_near: ray.t_far, t_far: f32::INFINITY, ..*ray })
+        .collect();
+    let share = |n: usize| n as f64 / gathers.len() as f64;
+    let is_box = |hit: &&Hit| {
+        hit.is_hit() && matches!(far.geometry.sources[hit.triangle as usize], TriangleSource::BoxFace { .. })
     };
-    [share(&*prepared.detailed, &is_clutter), share(&*far.rays, &is_box)]
+    [
+        share(near.iter().filter(|h| is_clutter(h)).count()),
+        share(trace(&*prepared.detailed, &beyond).iter().filter(|h| is_clutter(h)).count()),
+        share(trace(&*far.rays, &beyond).iter().filter(is_box).count()),
+    ]
 }
 
 fn gsii_014_white_clutter(case: &Case, out: &mut Outcome<'_>) {
@@ -291,12 +313,14 @@ fn gsii_014_white_clutter(case: &Case, out: &mut Outcome<'_>) {
             let prepared = prepare_seeds(&scene, &settings);
             let seen = all_parts_of(&prepared, &cameras, [4, 4], 1 << 8);
             if r == 0.05 {
-                // Emitted light is stopped by the clutter, reflected light comes from the boxes.
-                let [clutter, boxes] = stopped(&prepared[0], v(0.2, 0.2, 0.0));
-                let [predicted, measured] = [2.0 - 0.5 * (clutter - boxes), seen[0][Part::All as usize].mean * PI];
+                // Emitted light is stopped by the clutter, reflected light comes from the boxes: a point that misses d of 2 has
+                // d = n d + x - y.
+                let [n, x, y] = gather_shares(&prepared[0], &camera, r);
+                let [predicted, measured] = [2.0 - (x - y) / (1.0 - n), seen[3][Part::All as usize].mean * PI];
                 out.note(format!(
-                    "{fit:?}, `r_thresh` 0.05: of the rays from the floor the clutter stops {clutter:.4} and its boxes {boxes:.4}, hence view 0 \
-                     is {predicted:.4}; measured {measured:.4}."
+                    "{fit:?}, `r_thresh` 0.05: of the gather rays from what view 3 sees of the clutter n = {n:.4} meet clutter nearby; \
+                     beyond, it stops x = {x:.4} and its boxes y = {y:.4}, hence 2 - (x - y) / (1 - n) = {predicted:.4}; measured \
+                     {measured:.4}."
                 ));
             }
             for (i, [.., l]) in seen.into_iter().enumerate() {

@@ -122,6 +122,7 @@ pub fn fixed(width: u32, height: u32, trials: u32, seed: u32) -> RenderParams {
         min_trials: trials,
         max_trials: trials,
         interpolate: false,
+        error: f32::INFINITY,
         hires_error: 0.05,
         lores_error: 0.05,
         time_limit: None,

@@ -9,7 +9,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::Patches;
+use super::{Patches, neighbours};
 use crate::backend::{Coherence, Ray, Visible};
 use crate::radiosity::RadiosityScene;
 use crate::radiosity::shoot::side_normal;
@@ -22,7 +22,7 @@ const ALL: u16 = u16::MAX;
 /// A part is covered when something lies above it within this share of the patch's diameter.
 const REACH: f32 = 0.1;
 /// Sides looked at by one job.
-const JOB: usize = 256;
+const JOB: usize = 64;
 
 /// For each side, one bit for each of `PARTS x PARTS` parts of its area.
 #[derive(Clone, Debug)]
@@ -39,8 +39,11 @@ impl Exposure {
     /// Finds covered parts with one ray each, along the normal from a random point. A side without any open part is taken to be all
     /// open: something lies close above all of it, but they may still light each other.
     pub fn find(input: &RadiosityScene<'_>, patches: &Patches, seed: u32) -> Self {
-        let sides: Vec<u32> = (0..2 * patches.len() as u32).collect();
-        let open = sides
+        let may_be_covered = neighbours::may_be_covered(input.geometry, patches, REACH);
+        let sides: Vec<u32> = (0..2 * patches.len() as u32)
+            .filter(|&side| may_be_covered[side as usize / 2][side as usize % 2] && !patches.is_inside_of_box(side))
+            .collect();
+        let found: Vec<u16> = sides
             .par_chunks(JOB)
             .flat_map_iter(|sides| {
                 let mut rays = Vec::with_capacity(sides.len() * (PARTS * PARTS) as usize);
@@ -64,7 +67,11 @@ impl Exposure {
                 masks
             })
             .collect();
-        Exposure { open }
+        let mut exposure = Exposure::everything(2 * patches.len());
+        for (side, open) in sides.into_iter().zip(found) {
+            exposure.open[side as usize] = open;
+        }
+        exposure
     }
 
     /// Share of a side that lies open, above 0.

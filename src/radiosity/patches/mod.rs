@@ -7,16 +7,18 @@ mod charts;
 mod exposure;
 mod grid;
 mod join;
+pub(super) mod neighbours;
 mod sampling;
 
 use std::collections::VecDeque;
 
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec3, Vec2};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
 use crate::radiosity::{Focus, RadiosityParams, RadiosityScene};
+use crate::scene::Plane;
 use crate::shading::SurfacePoint;
 use crate::simplify::{Cluster, SimplifiedGeometry, TriangleSource};
 use charts::{Charts, Frame};
@@ -49,8 +51,8 @@ pub(super) struct Patches {
     exposure: Exposure,
     /// Diameter of each patch.
     pub diameter: Vec<f32>,
-    /// Unit normal of each triangle.
-    pub normals: Vec<Vec3>,
+    /// Plane of each triangle.
+    pub planes: Vec<Plane>,
     /// Where on its equivalent box a patch lies.
     pub box_cell: Vec<Option<BoxCell>>,
     /// Edge length that was used: the one asked for, or larger.
@@ -132,8 +134,8 @@ impl Patches {
         let parts: Vec<Part> =
             grids.par_iter().zip(&members).map(|(grid, triangles)| part(geometry, grid, triangles)).collect();
 
-        let normals =
-            geometry.triangles.par_iter().map(|&t| vector_area(geometry, t).normalize_or_zero().as_vec3()).collect();
+        let plane = |t: &[u32; 3]| Plane::of(t.map(|i| geometry.positions[i as usize]));
+        let planes = geometry.triangles.par_iter().map(plane).collect();
         let mut patches = Patches {
             map: PatchMap {
                 maps: vec![CellMap::default(); geometry.triangles.len()],
@@ -145,7 +147,7 @@ impl Patches {
             relevance: Vec::new(),
             exposure: Exposure::everything(0),
             diameter: Vec::new(),
-            normals,
+            planes,
             box_cell: Vec::new(),
             size,
         };

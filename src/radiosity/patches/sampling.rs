@@ -2,7 +2,7 @@
 
 use glam::Vec2;
 
-use super::Patches;
+use super::{Patches, Piece};
 use crate::shading::SurfacePoint;
 use crate::simplify::SimplifiedGeometry;
 
@@ -11,10 +11,14 @@ use crate::simplify::SimplifiedGeometry;
 const INSET: f32 = 1.0 / 1_048_576.0;
 
 impl Patches {
+    /// What a patch is made of.
+    pub(super) fn pieces(&self, patch: u32) -> &[Piece] {
+        &self.pieces[self.first_piece[patch as usize] as usize..self.first_piece[patch as usize + 1] as usize]
+    }
+
     /// The point of `patch` that belongs to `s`, uniform in 0..1, as barycentrics of a triangle.
     pub fn sample(&self, patch: u32, s: [f32; 2]) -> (u32, Vec2) {
-        let range = self.first_piece[patch as usize] as usize..self.first_piece[patch as usize + 1] as usize;
-        let pieces = &self.pieces[range];
+        let pieces = self.pieces(patch);
         let i = pieces.partition_point(|p| p.share <= s[0]).min(pieces.len() - 1);
         let before = if i == 0 { 0.0 } else { pieces[i - 1].share };
         let x = ((s[0] - before) / (pieces[i].share - before)).clamp(0.0, 1.0);
@@ -30,6 +34,6 @@ impl Patches {
     pub fn point(&self, geometry: &SimplifiedGeometry, patch: u32, s: [f32; 2]) -> SurfacePoint {
         let (triangle, uv) = self.sample(patch, s);
         let corners = geometry.triangles[triangle as usize].map(|i| geometry.positions[i as usize]);
-        SurfacePoint::flat(corners, triangle, uv.x, uv.y)
+        SurfacePoint::on_plane(corners, &self.planes[triangle as usize], triangle, uv.x, uv.y)
     }
 }

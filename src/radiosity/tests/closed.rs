@@ -5,19 +5,6 @@ use glam::{DVec3, Vec3};
 use super::*;
 
 #[test]
-fn rad_001_diffuse_furnace() {
-    for (rho, expected) in [(0.0, 1.0), (0.1, 1.1111111), (0.3, 1.4285714), (0.5, 2.0), (0.7, 3.3333333), (0.9, 10.0)] {
-        let room = closed_box([1.0; 3], [rho; 6], [1.0; 6]);
-        // The error counts reflected light, a share rho of B: the tolerance is five standard errors.
-        let error = 2e-4 / rho.max(0.1);
-        let solution = room.solve(&RadiosityParams { error, ..one_patch() }).unwrap();
-        for face in 0..6 {
-            assert_close(&format!("rho {rho} face {face}"), room.surface(&solution, face).1.x, expected, 1e-3);
-        }
-    }
-}
-
-#[test]
 fn rad_001_furnace_of_many_patches_agrees_within_its_own_deviation() {
     let room = closed_box([1.0; 3], [0.5; 6], [1.0; 6]);
     let params = RadiosityParams { patch_size: 0.125, error: 1e-2, unshot: 1e-3, ..one_patch() };
@@ -58,7 +45,8 @@ fn rad_004_three_bands() {
     let look = Material::emitter(Vec3::splat(1.0 / std::f32::consts::PI), Vec3::new(0.2, 0.5, 0.8));
     let surfaces = box_faces([1.0; 3]).map(|face| (diced(face, 1), look.clone()));
     let room = Room::new(surfaces.into(), Vec::new());
-    let solution = room.solve(&one_patch()).unwrap();
+    // The tolerance is five standard errors.
+    let solution = room.solve(&RadiosityParams { error: 2e-4, ..one_patch() }).unwrap();
     let (_, b) = room.surface(&solution, 3);
     for (band, expected) in [1.25, 2.0, 5.0].into_iter().enumerate() {
         assert_close(&format!("band {band}"), b[band], expected, 1e-3);
@@ -194,8 +182,10 @@ fn rad_012_and_013_energy_after_every_shot() {
     let emitted = light.flux.x;
     assert_close("emitted", emitted, 6.0 + 0.3 * 3.0, 1e-6);
     let mut run = Run::new(&tracer, light.incident, light.flux, light.tally, 8);
+    let mut unshot = refine::Unshot::default();
     for _ in 0..20 {
-        run.step(5000.0);
+        run.survey(&mut unshot);
+        run.step(&unshot, 5000.0);
         let ledger = run.ledger();
         let incident: f64 = run.incident(false).iter().map(|f| f.x).sum();
         let identity = 0.5 * (emitted + 0.5 * incident) + 0.5 * ledger.unshot[0] - emitted;

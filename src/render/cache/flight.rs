@@ -6,7 +6,7 @@
 
 use rayon::prelude::*;
 
-use super::{IrradianceCache, PASSES, Record, STREAM, gather};
+use super::{IrradianceCache, PASSES, Record, STREAM, Strata, gather};
 use crate::render::integrator::World;
 use crate::render::view::ViewRays;
 use crate::render::workspace::Workspace;
@@ -24,7 +24,8 @@ impl IrradianceCache {
     ) -> Self {
         let mut cache = IrradianceCache { passes: PASSES.len(), ..IrradianceCache::default() };
         let Some(far) = &world.far else { return cache };
-        for (pass, (spacing, strata)) in (0u32..).zip(PASSES) {
+        for (pass, (spacing, rays)) in (0u32..).zip(PASSES) {
+            let strata = Strata::of(rays);
             for (number, (camera, size)) in (0u32..).zip(views) {
                 let view = ViewRays::new(camera, *size, hash_all(&[seed, STREAM, number]));
                 let places = cache.places(world, &view, *size, spacing, pass);

@@ -8,31 +8,36 @@
 mod clamp;
 mod flight;
 mod index;
+mod nearby;
 mod record;
 
 use glam::Vec3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use super::RenderParams;
 use super::integrator::{Captured, FarField, World};
 use super::path::{Arrival, Path};
 use super::view::ViewRays;
 use super::workspace::Workspace;
 use crate::backend::Ray;
-use crate::sampling::{hash_all, sobol};
+use crate::sampling::{basis, hash_all, sobol};
 use crate::scene::Camera;
 use clamp::clamped_distances;
 use index::Index;
+pub use nearby::Nearby;
 use record::{Record, Strata};
 
 /// Pass after pass: the distance in pixels of the places that are looked at, and the rays of a record. Records that are close
 /// together share their noise.
-const PASSES: [(u32, Strata); 4] = [
-    (16, Strata { rings: 16, sectors: 48 }),
-    (8, Strata { rings: 12, sectors: 36 }),
-    (4, Strata { rings: 10, sectors: 30 }),
-    (2, Strata { rings: 8, sectors: 24 }),
-];
+const PASSES: [(u32, f32); 4] = [(16, 768.0), (8, 432.0), (4, 300.0), (2, 192.0)];
+
+/// Relative error of an image for which records have so many rays. Noise of records is not seen in that of pixels, and falls as
+/// slowly as any.
+const ERROR: f32 = 0.015;
+
+/// Factors that the number of rays is kept between.
+const RAYS: [f32; 2] = [0.25, 4.0];
 
 /// A place that has less weight of records than this gets one of its own.
 const COVERED: f32 = 0.4;
@@ -102,8 +107,7 @@ impl IrradianceCache {
         &mut self,
         world: &World<'_>,
         camera: &Camera,
-        size: [u32; 2],
-        seed: u32,
+        params: &RenderParams,
         over: &(dyn Fn() -> bool + Sync),
         each: &mut dyn FnMut(&Self),
     ) -> bool {
@@ -111,9 +115,11 @@ impl IrradianceCache {
             self.passes = PASSES.len();
             return true;
         };
+        let (size, seed) = ([params.width, params.height], params.seed);
         let view = ViewRays::new(camera, size, hash_all(&[seed, STREAM]));
-        while let Some(&(spacing, strata)) = PASSES.get(self.passes) {
+        while let Some(&(spacing, rays)) = PASSES.get(self.passes) {
             let pass = self.passes as u32;
+            let strata = Strata::of(rays * rays_for(params.error));
             let places = self.places(world, &view, size, spacing, pass);
             while self.next < places.len() {
                 let chunk = self.next..(self.next + CHUNK).min(places.len());
@@ -197,18 +203,10 @@ impl IrradianceCache {
         self.records.is_empty()
     }
 
-    /// Irradiance over pi at a point with shading normal `normal`; `None` where no record reaches, or most refuse.
-    pub fn look_up(&self, position: Vec3, normal: Vec3) -> Option<Vec3> {
-        let (mut sum, mut weights, mut refused) = (Vec3::ZERO, 0.0, 0.0);
-        for (weight, record) in self.around(position, normal) {
-            if record.refuses {
-                refused += weight;
-            } else {
-                sum += weight * record.at(position, normal);
-                weights += weight;
-            }
-        }
-        (weights > refused).then(|| sum / weights)
+    /// Irradiance over pi at a point with shading normal `normal` that is seen with pixels of the width `pixel` (which only decides how
+    /// much is kept in `nearby`); `None` where no record reaches, or most refuse.
+    pub fn look_up(&self, nearby: &mut Nearby, pixel: f32, position: Vec3, normal: Vec3) -> Option<Vec3> {
+        nearby.around(&self.index, &self.records, pixel, position)?.look_up(position, normal)
     }
 
     /// Asks the others what each record measured itself. Records that are told something else refuse.
@@ -232,6 +230,11 @@ impl IrradianceCache {
     }
 }
 
+/// Factor on the rays of records for an image of relative error `error`; one where none is asked for.
+fn rays_for(error: f32) -> f32 {
+    if error.is_finite() { (ERROR / error).clamp(RAYS[0], RAYS[1]) } else { 1.0 }
+}
+
 /// A place that may get a record.
 #[derive(Clone)]
 struct Place {
@@ -250,12 +253,14 @@ fn gather(
     stream: u32,
 ) -> Option<Record> {
     let Captured { point, normal, .. } = &place.captured;
-    let paths: Vec<Path> = (0..strata.len())
+    let frame = basis(*normal);
+    let paths: Vec<Path> = strata
+        .in_blocks()
         .map(|k| {
-            let direction = strata.direction(*normal, k, stream);
-            let [.., u, _] = sobol(k as u32, 0, stream);
+            let [u, v, near, _] = sobol(k as u32, 0, stream);
+            let direction = strata.direction(&frame, k, [u, v]);
             Path {
-                near: far.r_thresh * (0.5 + u),
+                near: far.r_thresh * (0.5 + near),
                 arrival: Arrival::Soft,
                 gathers: true,
                 depth: 1,

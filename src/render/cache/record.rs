@@ -5,7 +5,7 @@ use std::f32::consts::{FRAC_1_PI, TAU};
 use glam::{Mat3, Vec3};
 use serde::{Deserialize, Serialize};
 
-use crate::sampling::{basis, sobol};
+use crate::sampling::basis;
 
 /// Strata of the hemisphere: rings of equal projected solid angle, cut into sectors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,27 +20,45 @@ impl Strata {
         self.rings * self.sectors
     }
 
-    /// The direction of ray `k` (ring by ring) of the record of `stream` around `normal`, cosine-distributed in its stratum.
-    pub fn direction(self, normal: Vec3, k: usize, stream: u32) -> Vec3 {
-        let u = sobol(k as u32, 0, stream);
+    /// Strata for about so many rays, as wide as high.
+    pub fn of(rays: f32) -> Self {
+        let rings = ((rays / 3.0).sqrt().round() as usize).max(4);
+        Strata { rings, sectors: 3 * rings }
+    }
+
+    /// Numbers of all rays, in blocks of neighbouring directions.
+    pub fn in_blocks(self) -> impl Iterator<Item = usize> {
+        let blocks = |count: usize, of: usize| (0..count).step_by(of).map(move |low| low..(low + of).min(count));
+        let (rings, sectors) = BLOCK;
+        blocks(self.rings, rings).flat_map(move |rings| {
+            blocks(self.sectors, sectors).flat_map(move |sectors| {
+                rings.clone().flat_map(move |ring| sectors.clone().map(move |sector| ring * self.sectors + sector))
+            })
+        })
+    }
+
+    /// The direction of ray `k` (ring by ring) around the third axis of `frame`, cosine-distributed in its stratum; `u` uniform in 0..1.
+    pub fn direction(self, frame: &Mat3, k: usize, u: [f32; 2]) -> Vec3 {
         let (ring, sector) = (k / self.sectors, k % self.sectors);
         let sin2 = (ring as f32 + u[0]) / self.rings as f32;
-        let phi = TAU * (sector as f32 + u[1]) / self.sectors as f32;
-        let (sin, cos) = phi.sin_cos();
+        let (sin, cos) = (TAU * (sector as f32 + u[1]) / self.sectors as f32).sin_cos();
         let radius = sin2.sqrt();
-        basis(normal) * Vec3::new(radius * cos, radius * sin, (1.0 - sin2).max(0.0).sqrt())
+        *frame * Vec3::new(radius * cos, radius * sin, (1.0 - sin2).max(0.0).sqrt())
     }
 }
 
+/// Rings and sectors of a block of rays that are traced as one packet.
+const BLOCK: (usize, usize) = (4, 2);
+
 /// Largest angle between normals over which a record is used: 20 degrees, as the cosine.
-const LEAST_COSINE: f32 = 0.939_692_6;
+pub(super) const LEAST_COSINE: f32 = 0.939_692_6;
 
 /// Largest change that gradients may make, as a share of the record's own light.
-const MOST_CHANGE: f32 = 0.5;
+pub(super) const MOST_CHANGE: f32 = 0.5;
 
 /// A point may lie this far in front of a record's tangent plane, as a share of the record's reach, before the record is taken to
 /// see what the point does not (Ward 1988, section 2.2).
-const IN_FRONT: f32 = 0.1;
+pub(super) const IN_FRONT: f32 = 0.1;
 
 /// Indirect light at one point of a surface, and how it changes around it.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
@@ -59,9 +77,9 @@ pub(super) struct Record {
     /// Irradiance over pi: the radiance that a white diffuse surface reflects, W/(sr m^2).
     pub radiance: Vec3,
     /// Change of each band with the normal: scalar product with the axis of rotation times its sine.
-    by_rotation: [Vec3; 3],
+    pub by_rotation: [Vec3; 3],
     /// Change of each band with the position.
-    by_translation: [Vec3; 3],
+    pub by_translation: [Vec3; 3],
 }
 
 impl Record {
@@ -181,17 +199,30 @@ impl Record {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sampling::sobol;
 
     /// A record at `position` in a world where a ray brings what `radiance` says of its origin and direction, from a distance.
     fn record(position: Vec3, normal: Vec3, stream: u32, world: &dyn Fn(Vec3, Vec3) -> (f32, f32)) -> Record {
         let strata = Strata { rings: 16, sectors: 48 };
+        let frame = basis(normal);
         let (radiance, distances): (Vec<Vec3>, Vec<f32>) = (0..strata.len())
             .map(|k| {
-                let (l, d) = world(position, strata.direction(normal, k, stream));
+                let [u, v, ..] = sobol(k as u32, 0, stream);
+                let (l, d) = world(position, strata.direction(&frame, k, [u, v]));
                 (Vec3::splat(l), d)
             })
             .unzip();
         Record::new(position, normal, 0.1, strata, &radiance, &distances).unwrap()
+    }
+
+    #[test]
+    fn blocks_hold_every_ray_once() {
+        for strata in [Strata { rings: 16, sectors: 48 }, Strata { rings: 7, sectors: 21 }, Strata::of(1.0)] {
+            let mut all: Vec<usize> = strata.in_blocks().collect();
+            all.sort_unstable();
+            assert_eq!(all, (0..strata.len()).collect::<Vec<_>>());
+        }
+        assert_eq!(Strata::of(768.0), Strata { rings: 16, sectors: 48 });
     }
 
     /// Light that depends on the direction only: `L = 1 + x` gives `E / pi = 1 + 2/3 n_x`.

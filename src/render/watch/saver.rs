@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use super::{Moment, Rhythm, Watcher};
 use crate::error::Result;
-use crate::render::checkpoint::{self, Identity};
+use crate::render::checkpoint::{self, LateIdentity};
 use crate::render::session::Session;
 
 /// From one checkpoint to the next goes so many times what writing takes: most of that is waiting for the disk.
@@ -14,19 +14,19 @@ const PAUSE: u32 = 4;
 /// Writes a [checkpoint] from time to time, and when work is cut short.
 pub struct Saver {
     path: PathBuf,
-    identity: Identity,
+    identity: LateIdentity,
     rhythm: Rhythm,
     failed: bool,
 }
 
 impl Saver {
     /// Writes to `path` about `every` so long.
-    pub fn new(path: &Path, identity: Identity, every: Duration) -> Self {
+    pub fn new(path: &Path, identity: LateIdentity, every: Duration) -> Self {
         Saver { path: path.to_owned(), identity, rhythm: Rhythm::new(every, PAUSE), failed: false }
     }
 
     fn save(&mut self, session: &Session) -> Result<()> {
-        let (path, identity) = (&self.path, &self.identity);
+        let (path, identity) = (&self.path, self.identity.get()?);
         let before = session.spent().wall;
         self.rhythm.beat(|| checkpoint::write(path, identity, session))?;
         let bytes = std::fs::metadata(path).map_or(0, |file| file.len());

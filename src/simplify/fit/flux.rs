@@ -19,10 +19,10 @@ use crate::error::Result;
 use crate::scene::Scene;
 
 /// Fewest lines for one cluster; the number doubles until the error is small or the budget is used up.
-pub const LEAST_LINES: u32 = 512;
+pub const LEAST_LINES: u32 = 1024;
 
 /// Relative standard error of `p` at which no more lines are needed.
-const WANTED_ERROR: f64 = 0.02;
+const WANTED_ERROR: f64 = 0.04;
 
 /// Lines followed at a time.
 const BATCH: u32 = 512;

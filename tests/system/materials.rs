@@ -4,14 +4,12 @@
 //! is wrong.
 
 #[allow(dead_code, reason = "its main is not needed")]
-#[path = "../examples/materials.rs"]
+#[path = "../../examples/materials.rs"]
 mod example;
-
-mod common;
 
 use std::sync::Arc;
 
-use common::{Estimate, fixed, prepare, render, threshold};
+use crate::common::{self, Estimate, fixed, prepare, render, threshold};
 use glam::Vec3;
 use gsii::pipeline::{Method, Settings};
 use gsii::render::bias;

@@ -1,13 +1,12 @@
 //! Renderings that are killed, stopped, continued and looked at meanwhile.
 
-mod common;
-
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::path::PathBuf;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant, SystemTime};
 
+use crate::common;
 use gsii::image;
 use gsii::sampling::{hash_all, unit};
 

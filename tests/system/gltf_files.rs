@@ -1,10 +1,11 @@
 //! Real and hostile glTF files, where they are at hand: `../shared/scenes` beside the project.
 
-mod common;
-
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Instant;
 
+use crate::common::{self, interpolated, prepare, render, values};
+use gsii::pipeline::Settings;
 use gsii::scene::{LoadOptions, Scene, load};
 use serde::Deserialize;
 
@@ -38,6 +39,13 @@ fn difference(scene: &Scene, case: &Case) -> Option<String> {
         }
     }
     None
+}
+
+/// Whether every stage from simplification to the film gets through, with numbers in all pixels.
+fn can_be_rendered(scene: &Scene) -> bool {
+    let (prepared, _) = prepare(&Arc::new(scene.clone()), Settings::default());
+    let film = render(&prepared, &interpolated(16, 9, 1, 0)).film;
+    values(&film).iter().all(|value| value.is_finite())
 }
 
 /// What loading gave, in a few words.
@@ -75,7 +83,10 @@ fn edge_cases_behave_as_listed() {
         };
         match &result {
             Ok(scene) => {
-                println!("{}: {} triangles {:?}", case.file, scene.mesh.triangles.len(), scene.notes)
+                println!("{}: {} triangles {:?}", case.file, scene.mesh.triangles.len(), scene.notes);
+                if scene.mesh.triangles.len() < 1_000_000 {
+                    assert!(can_be_rendered(scene), "{}", case.file);
+                }
             }
             Err(error) => println!("{} ({}): {error}", case.file, case.expect),
         }

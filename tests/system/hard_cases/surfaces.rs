@@ -8,9 +8,9 @@ use gsii::pipeline::{Method, Settings};
 use gsii::render::film::Film;
 use gsii::scene::{MeshData, Scene};
 
+use super::scenes::*;
+use super::{SIGMA, range};
 use crate::kit::*;
-use crate::scenes::*;
-use crate::{SIGMA, range};
 
 #[test]
 fn what_is_no_surface_changes_nothing() {

@@ -3,11 +3,9 @@
 //! Statistical tests use fixed seeds; the stated false-alarm rate is the chance with which another seed would fail although nothing
 //! is wrong.
 
-mod common;
-
 use std::sync::Arc;
 
-use common::{Body, EYE, Estimate, cluttered_room, fixed, gltf, prepare, render, threshold, values};
+use crate::common::{self, Body, EYE, Estimate, cluttered_room, fixed, gltf, prepare, render, threshold, values};
 use glam::Vec3;
 use gsii::pipeline::{Method, Settings};
 use gsii::render::{RenderParams, bias, show::show_radiosity};

@@ -1,8 +1,6 @@
 //! A part of an image has the bits of the whole one, and parts make the whole.
 
-mod common;
-
-use common::{fixed, lit_room, prepare, render, scene};
+use crate::common::{fixed, lit_room, prepare, render, scene};
 use gsii::image::{self, Value};
 use gsii::pipeline::{Method, Settings};
 use gsii::render::film::{Pixel, Region};

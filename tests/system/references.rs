@@ -1,12 +1,10 @@
 //! Images against converged references of an independent path tracer, where they are at hand (`../shared/refs/images`).
 
-mod common;
-
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Arc;
 
-use common::{Estimate, fixed, interpolated, prepare, render, shared, values};
+use crate::common::{Estimate, fixed, interpolated, prepare, render, shared, values};
 use gsii::image::{self, Image};
 use gsii::pipeline::{Method, Settings};
 use gsii::render::{Film, RenderParams};

@@ -10,10 +10,10 @@ use gsii::render::film::PixelSum;
 use gsii::render::{RenderParams, bias, render};
 use gsii::scene::Material;
 
+use super::scenes::*;
+use super::{SIGMA, fixed, range};
 use crate::kit::*;
 use crate::report::Estimate;
-use crate::scenes::*;
-use crate::{SIGMA, fixed, range};
 
 #[test]
 fn hidden_light_stays_hidden() {

@@ -1,11 +1,9 @@
 //! Many views of one scene: what was prepared is kept and reused, and frames of an animation do not flicker.
 
-mod common;
-
 use std::path::{Path, PathBuf};
 
+use crate::common::{EYE, lit_room};
 use base64::Engine;
-use common::{EYE, lit_room};
 use gsii::image;
 use serde_json::{Value, json};
 

@@ -3,16 +3,15 @@
 //! Statistical tests use fixed seeds: they give the same answer every time. The stated false-alarm rate is the chance with which
 //! another seed would fail although nothing is wrong.
 
-mod common;
 #[allow(dead_code, reason = "its main is not needed")]
-#[path = "../examples/library.rs"]
+#[path = "../../examples/library.rs"]
 mod library;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use common::{
-    Estimate, cluttered_room, fixed, gltf, interpolated, lit_room, prepare, render, scene, threshold, values,
+use crate::common::{
+    self, Estimate, cluttered_room, fixed, gltf, interpolated, lit_room, prepare, render, scene, threshold, values,
 };
 use gsii::pipeline::{BackendKind, Method, Settings};
 use gsii::render::{RenderParams, World, bias};
@@ -58,7 +57,7 @@ fn the_number_of_threads_does_not_change_a_bit() {
 
 #[test]
 fn seeds_make_different_images() {
-    for method in [Method::Gsii, Method::Mcpt] {
+    for method in [Method::Gsii, Method::Pmm, Method::Mcpt, Method::Radiosity] {
         let of = |seed| bits(&image(Settings { seed, ..with(method) }, &fixed(24, 16, 4, seed)));
         assert_ne!(of(0), of(1), "{method:?}");
     }
