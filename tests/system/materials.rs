@@ -61,9 +61,11 @@ fn white_materials_vanish_in_uniform_surroundings() {
                 change(material);
             }
         });
-        for method in [Method::Mcpt, Method::Gsii] {
+        // Glass takes no part in the radiosity solution but lets its light through: what is new there, the first lobes have.
+        let methods = if name.contains("glass") { &[Method::Mcpt][..] } else { &[Method::Mcpt, Method::Gsii] };
+        for &method in methods {
             let (prepared, stats) = prepare(&scene, settings(method));
-            let rendering = render(&prepared, &fixed(SIZE[0], SIZE[1], 64, 3));
+            let rendering = render(&prepared, &fixed(SIZE[0], SIZE[1], 32, 3));
             let got = Estimate::whole(&rendering.film);
             // Tabulated albedos are within 2 % of the integral, and the balls fill less than a third of the picture, where light
             // meets up to a few boundaries; much less on average.
@@ -78,6 +80,7 @@ fn white_materials_vanish_in_uniform_surroundings() {
 }
 
 /// Light along one diameter of a ball of glass: what the ball's inside leaves is the attenuation colour to the power of the distance.
+/// All methods follow what the camera sees through glass with the same code.
 #[test]
 fn glass_absorbs_along_the_way() {
     const TRIALS: u32 = 256;
@@ -92,30 +95,28 @@ fn glass_absorbs_along_the_way() {
             material.attenuation_distance = if absorbs { distance } else { f32::INFINITY };
         })
     };
-    for method in [Method::Mcpt, Method::Gsii] {
-        let film =
-            |absorbs| render(&prepare(&scene(absorbs), settings(method)).0, &fixed(SIZE[0], SIZE[1], TRIALS, 0)).film;
-        let [clear, tinted] = [false, true].map(film);
-        // This pixel looks at the middle of the ball in the middle: its edges are 0.1 to the right and 0.06 above or below.
-        let middle = |film: &gsii::render::Film| {
-            let at = (SIZE[1] / 2 - 2) * SIZE[0] + SIZE[0] / 2;
-            let pixel = film.pixels().nth(at as usize).unwrap();
-            let (h, l) = (pixel.hires.mean(), pixel.lores.mean());
-            Vec3::from_array([0, 1, 2].map(|band| (h[band] + l[band]) as f32))
-        };
-        let (got, all) = (middle(&tinted), middle(&clear));
-        assert_eq!(all, Vec3::ONE, "clear glass that does not bend");
-        // A chord at most 0.12 from the centre is between 0.97 and 1 long; the polyhedron's facets take 0.005 of that at most.
-        let after = |length: f32| color.powf(length / distance);
-        let (most, least) = (after(0.965), after(1.0));
-        println!("{method:?}: {got}, between {least} and {most}");
-        // Russian roulette ends some of the paths and strengthens the others, all bands alike: their ratios have no noise.
-        let (ratio, high, low) = (got / got.z, most / most.z, least / least.z);
-        assert!(ratio.cmple(1.0001 * high).all() && ratio.cmpge(0.9999 * low).all(), "{ratio} {low} {high}");
-        // It ends 0.14 of them: 4.4 standard errors of what remains, one false alarm in 1e5.
-        let noise = 4.4 * (0.14 / 0.86 / TRIALS as f32).sqrt();
-        assert!(got.z < most.z * (1.0 + noise) && got.z > least.z * (1.0 - noise), "{got} {noise}");
-    }
+    let film =
+        |absorbs| render(&prepare(&scene(absorbs), settings(Method::Mcpt)).0, &fixed(SIZE[0], SIZE[1], TRIALS, 0)).film;
+    let [clear, tinted] = [false, true].map(film);
+    // This pixel looks at the middle of the ball in the middle: its edges are 0.1 to the right and 0.06 above or below.
+    let middle = |film: &gsii::render::Film| {
+        let at = (SIZE[1] / 2 - 2) * SIZE[0] + SIZE[0] / 2;
+        let pixel = film.pixels().nth(at as usize).unwrap();
+        let (h, l) = (pixel.hires.mean(), pixel.lores.mean());
+        Vec3::from_array([0, 1, 2].map(|band| (h[band] + l[band]) as f32))
+    };
+    let (got, all) = (middle(&tinted), middle(&clear));
+    assert_eq!(all, Vec3::ONE, "clear glass that does not bend");
+    // A chord at most 0.12 from the centre is between 0.97 and 1 long; the polyhedron's facets take 0.005 of that at most.
+    let after = |length: f32| color.powf(length / distance);
+    let (most, least) = (after(0.965), after(1.0));
+    println!("{got}, between {least} and {most}");
+    // Russian roulette ends some of the paths and strengthens the others, all bands alike: their ratios have no noise.
+    let (ratio, high, low) = (got / got.z, most / most.z, least / least.z);
+    assert!(ratio.cmple(1.0001 * high).all() && ratio.cmpge(0.9999 * low).all(), "{ratio} {low} {high}");
+    // It ends 0.14 of them: 4.4 standard errors of what remains, one false alarm in 1e5.
+    let noise = 4.4 * (0.14 / 0.86 / TRIALS as f32).sqrt();
+    assert!(got.z < most.z * (1.0 + noise) && got.z > least.z * (1.0 - noise), "{got} {noise}");
 }
 
 /// Rough metal, rough and absorbing glass, a normal map and a mirror under an image: GSII against converged path tracing, up to the bias
@@ -135,8 +136,8 @@ fn all_materials_agree_with_path_tracing() {
         let film = render(&prepared, &fixed(SIZE[0], SIZE[1], trials, seed)).film;
         (prepared, film)
     };
-    let (_, reference) = of(Method::Mcpt, 1024, 1);
-    let (prepared, film) = of(Method::Gsii, 256, 2);
+    let (_, reference) = of(Method::Mcpt, 512, 1);
+    let (prepared, film) = of(Method::Gsii, 128, 2);
     let measured = bias::measure(&prepared.world(), &scene.cameras[0], &fixed(SIZE[0], SIZE[1], 1, 3), 1 << 16);
     let mean = |v: [f64; 3]| v.iter().sum::<f64>() / 3.0;
     let (exact, got) = (Estimate::whole(&reference), Estimate::whole(&film));
