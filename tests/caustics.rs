@@ -15,7 +15,7 @@ use gsii::render::{self, Film, World, bias};
 use gsii::scene::{Camera, LightKind, Material, MeshData, Projection, PunctualLight, Scene, SceneBuilder};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-const ALPHA: f64 = 1e-4;
+const ALPHA: f64 = 1e-3;
 
 fn add(builder: &mut SceneBuilder, body: &Body, material: Material) {
     let data = MeshData {
