@@ -13,7 +13,7 @@ use gsii::render::{self, Film, World, bias};
 use gsii::scene::{Camera, LightKind, Material, MeshData, Projection, PunctualLight, Scene, SceneBuilder};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-const ALPHA: f64 = 1e-4;
+const ALPHA: f64 = 1e-3;
 
 fn add(builder: &mut SceneBuilder, body: &Body, material: Material) {
     let data = MeshData {
@@ -132,7 +132,7 @@ fn photons_and_gather_rays_bring_the_same_light() {
     for (name, bender, method, filter_glossy, tolerance) in cases {
         let scene = room(bender, Lamp::Cube(0.06));
         let (mut differences, mut caustics) = (Vec::new(), Vec::new());
-        for seed in 0..12 {
+        for seed in 0..8 {
             let r_thresh = (method == Method::Gsii).then_some(0.8);
             let radiosity =
                 Settings { radiosity_error: 1.0, unshot: 0.1, patch_size: Some(0.3), ..Settings::default() };

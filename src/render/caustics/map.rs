@@ -11,6 +11,9 @@ use rayon::prelude::*;
 /// Photons that an estimate is made from, where there are enough.
 const NEAREST: usize = 64;
 
+/// One of so many photons knows the irradiance of its place.
+const KNOWN: usize = 4;
+
 /// Photons on surfaces that are turned by more than 45 degrees (cosine) are not counted ...
 const LEAST_COSINE: f32 = 0.707;
 /// ... nor those farther off the tangent plane than this share of the radius.
@@ -41,23 +44,28 @@ pub(super) struct PhotonMap {
     /// `None` without photons.
     tree: Option<ImmutableKdTree<f32, u32, 3, 32>>,
     reach: f32,
-    /// Irradiance at each photon by the others, where they are dense.
+    /// Every so many photons: places where the irradiance by all others is known, if they are dense.
+    places: Option<ImmutableKdTree<f32, u32, 3, 32>>,
     irradiance: Vec<Option<Vec3>>,
 }
 
 impl PhotonMap {
     /// Sorts photons. `reach`: largest distance over which they are averaged.
     pub fn new(photons: Vec<Photon>, reach: f32) -> PhotonMap {
-        let positions: Vec<[f32; 3]> = photons.iter().map(|p| p.position.to_array()).collect();
-        let tree = (!photons.is_empty()).then(|| ImmutableKdTree::new_from_slice(&positions));
-        let mut map = PhotonMap { photons, tree, reach, irradiance: Vec::new() };
-        let at = |(number, photon): (usize, &Photon)| {
+        let tree = |every: usize| {
+            let positions: Vec<[f32; 3]> = photons.iter().step_by(every).map(|p| p.position.to_array()).collect();
+            (!positions.is_empty()).then(|| ImmutableKdTree::new_from_slice(&positions))
+        };
+        let (tree, places) = (tree(1), tree(KNOWN));
+        let mut map = PhotonMap { photons, tree, reach, places, irradiance: Vec::new() };
+        let at = |number: usize| {
+            let photon = &map.photons[number];
             let itself = Some(number as u32);
             let around = map.around(photon.position, itself);
             let dense = around.found.len() == NEAREST;
             dense.then(|| map.sum(&around, photon.position, photon.normal, &|_| Vec3::ONE))
         };
-        map.irradiance = map.photons.par_iter().enumerate().map(at).collect();
+        map.irradiance = (0..map.photons.len()).into_par_iter().step_by(KNOWN).map(at).collect();
         map
     }
 
@@ -68,7 +76,7 @@ impl PhotonMap {
 
     /// Radiance that photons make leave a point on a surface with unit geometric normal `normal` on the side that is seen; `scatter`
     /// is `f cos` for light from a unit direction, and `diffuse` the same over the cosine where it is the same for all. Where photons are
-    /// dense, diffuse light is that of the nearest photon's place, known beforehand (Christensen 1999).
+    /// dense, diffuse light is that of the nearest place where it is known beforehand (Christensen 1999).
     pub fn radiance(
         &self,
         position: Vec3,
@@ -85,16 +93,12 @@ impl PhotonMap {
         self.sum(&self.around(position, None), position, normal, &per_flux)
     }
 
-    /// The irradiance at the nearest photon, where it is known and on the same surface; zero where no photon is within reach.
+    /// The irradiance at the nearest place, where it is known and on the same surface.
     fn known(&self, position: Vec3, normal: Vec3) -> Option<Vec3> {
-        let Some(tree) = &self.tree else { return Some(Vec3::ZERO) };
-        let nearest = tree.nearest_one::<SquaredEuclidean>(&position.to_array());
-        if nearest.distance > self.reach * self.reach {
-            return Some(Vec3::ZERO);
-        }
-        let photon = &self.photons[nearest.item as usize];
+        let nearest = self.places.as_ref()?.nearest_one::<SquaredEuclidean>(&position.to_array());
+        let photon = &self.photons[KNOWN * nearest.item as usize];
         let off_plane = normal.dot(photon.position - position).abs() > OFF_PLANE * nearest.distance.sqrt();
-        let same = normal.dot(photon.normal) > SAME_SURFACE && !off_plane;
+        let same = normal.dot(photon.normal) > SAME_SURFACE && !off_plane && nearest.distance < self.reach * self.reach;
         self.irradiance[nearest.item as usize].filter(|_| same)
     }
 
