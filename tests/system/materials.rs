@@ -61,7 +61,7 @@ fn white_materials_vanish_in_uniform_surroundings() {
                 change(material);
             }
         });
-        // Glass takes no part in the radiosity solution but lets its light through: what is new there, the first lobes have.
+        // GSII shades glass with the same code, and takes long to solve radiosity among balls of glass.
         let methods = if name.contains("glass") { &[Method::Mcpt][..] } else { &[Method::Mcpt, Method::Gsii] };
         for &method in methods {
             let (prepared, stats) = prepare(&scene, settings(method));
