@@ -42,8 +42,9 @@ pub enum BoxFit {
     Paper1993,
 }
 
-/// Usual value of [`SimplifyParams::longest`]; measured in `docs/simplification.md`.
-pub const LONGEST_CLUSTER: f32 = 3.0;
+/// Usual value of [`SimplifyParams::longest`]: longer boxes need fewer surfaces, but stand in other places than their clusters (measured in
+/// `docs/simplification.md`).
+pub const LONGEST_CLUSTER: f32 = 1.0;
 
 /// Parameters of [`simplify`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

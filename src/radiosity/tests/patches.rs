@@ -74,7 +74,7 @@ fn nothing_that_covers_a_patch_is_overlooked() {
         let surface = |face: [Vec3; 4]| (diced(face.map(|p| turn * p), 2), material(0.5, 0.0));
         let room = Room::new(faces.into_iter().map(surface).collect(), Vec::new());
         let patches = cut(&room, 0.2);
-        let may_be_covered = patches::neighbours::may_be_covered(&room.geometry, &patches, REACH);
+        let may_be_covered = crate::radiosity::patches::neighbours::may_be_covered(&room.geometry, &patches, REACH);
         let (mut covered, mut open) = (0, 0);
         for side in 0..2 * patches.len() as u32 {
             let rays = (0..64).map(|i| {
