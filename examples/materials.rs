@@ -41,8 +41,11 @@ pub fn balls() -> [(f32, Value); 5] {
     ]
 }
 
+/// Positions, texture coordinates and triangles.
+type Ball = (Vec<[f32; 3]>, Vec<[f32; 2]>, Vec<[u32; 3]>);
+
 /// Positions and normals (equal but for the radius), texture coordinates and triangles of a ball of radius 0.5.
-fn ball() -> (Vec<[f32; 3]>, Vec<[f32; 2]>, Vec<[u32; 3]>) {
+fn ball() -> Ball {
     let (mut normals, mut uvs, mut triangles) = (Vec::new(), Vec::new(), Vec::new());
     for i in 0..=DOWN {
         for k in 0..=AROUND {

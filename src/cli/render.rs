@@ -94,7 +94,7 @@ pub struct Options {
     #[arg(long, value_name = "N", default_value_t = 512, help_heading = "Quality")]
     max_trials: u32,
     /// Fixed sampling: short for --min-trials N --max-trials N
-    #[arg(long, visible_alias = "samples", value_name = "N", help_heading = "Quality", conflicts_with_all = ["min_trials", "max_trials", "error", "hires_error", "lores_error"])]
+    #[arg(long, alias = "samples", value_name = "N", help_heading = "Quality", conflicts_with_all = ["min_trials", "max_trials", "error", "hires_error", "lores_error"])]
     spp: Option<u32>,
     /// Gather indirect light for each pixel by itself, with no interpolation between places: slower, and without its error
     #[arg(long, help_heading = "Quality")]

@@ -289,7 +289,7 @@ mod tests {
 
     #[test]
     fn wide_samples_are_means() {
-        let checker = |i: u32| if (i % 64 + i / 64) % 2 == 0 { [1.0; 4] } else { [0.0, 0.0, 0.0, 1.0] };
+        let checker = |i: u32| if (i % 64 + i / 64).is_multiple_of(2) { [1.0; 4] } else { [0.0, 0.0, 0.0, 1.0] };
         let texels = Texels::Float((0..64 * 64).flat_map(checker).collect());
         let t = Texture { width: 64, height: 64, ..texture(texels, Wrap::Repeat) }.with_smaller();
         let at = Vec2::splat(0.5 / 64.0);

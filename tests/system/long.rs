@@ -124,7 +124,7 @@ fn kill_and_resume(bench: &Bench, arguments: &[&str], image: &str, kills: u32, s
 }
 
 /// Adaptive sampling with an irradiance cache: all the stages that a rendering can have.
-const ADAPTIVE: [&str; 8] = ["--width", "60", "--height", "40", "--max-trials", "1024", "--error", "0.02"];
+const ADAPTIVE: [&str; 8] = ["--width", "60", "--height", "40", "--max-trials", "1024", "--error", "0.01"];
 
 #[test]
 fn killed_at_random_moments_and_resumed_gives_the_bytes_of_an_uninterrupted_run() {
