@@ -463,8 +463,10 @@ impl<'a> World<'a> {
             Some(caustics) if path.gathers => caustics.unbending(self.scene, point, outgoing),
             _ => None,
         };
+        // Paths from rough reflection have a share in light sources where nothing is interpolated.
+        let shares = path.gathers && unbending.is_none();
         if let Some(light) = light {
-            shine(ws, &path, point, self.scattered(&bsdf, unbending.as_ref(), light), light);
+            shine(ws, &path, point, self.scattered(&bsdf, unbending.as_ref(), shares, light), light);
         }
         let wanted = if path.gathers { passes.lores } else { passes.hires || capture.is_some() };
         if let Some(caustics) = self.caustics.filter(|_| wanted && look_up.is_none()) {
@@ -529,11 +531,15 @@ impl<'a> World<'a> {
         };
         let Some(sample) = sample else { return };
         rest /= share;
+        let arrival = match bsdf.pdf_rough(sample.direction).filter(|_| shares) {
+            Some(pdf) => Arrival::Glossy { pdf, position: point.position, normal: facing },
+            None => Arrival::Soft,
+        };
         let next = Path {
             ray: Ray::new(point.ray_origin(sample.direction), sample.direction),
             throughput: throughput * sample.weight / share,
             near: f32::INFINITY,
-            arrival: Arrival::Soft,
+            arrival,
             gathers: true,
             bent: false,
             depth: path.depth + 1,
@@ -552,17 +558,18 @@ impl<'a> World<'a> {
         }
     }
 
-    /// `f cos` for a sampled light source. What bends light is left to photons where they carry the light; rays from glossy lobes have
-    /// a share in their light.
-    fn scattered(&self, bsdf: &Bsdf, unbending: Option<&Bsdf>, light: &LightSample) -> Vec3 {
+    /// `f cos` for a sampled light source. What bends light is left to photons where they carry the light; rays from glossy lobes, and with
+    /// `shares` from rough ones, have a share in their light (balance heuristic).
+    fn scattered(&self, bsdf: &Bsdf, unbending: Option<&Bsdf>, shares: bool, light: &LightSample) -> Vec3 {
         if let (Some(unbending), Some(caustics)) = (unbending, self.caustics)
             && caustics.carry(light)
         {
             return unbending.eval_low(light.direction);
         }
+        let share = |other: f32| light.pdf.map_or(1.0, |pdf| pdf / (pdf + other));
         let (high, high_pdf) = bsdf.eval_high(light.direction);
-        let high_share = light.pdf.map_or(1.0, |pdf| pdf / (pdf + high_pdf));
-        bsdf.eval_low(light.direction) + high * high_share
+        let rough_pdf = bsdf.pdf_rough(light.direction).filter(|_| shares).unwrap_or(0.0);
+        bsdf.eval_low(light.direction) * share(rough_pdf) + high * share(high_pdf)
     }
 
     /// Share of met emission that counts: the rest is next-event estimation's at the start of the ray.

@@ -32,7 +32,7 @@ impl Passes {
 pub enum Arrival {
     /// From the camera, a mirror or refracting glass: emission counts in full.
     Sharp,
-    /// From a glossy lobe with this density: emission is weighted against next-event estimation (balance heuristic).
+    /// From a glossy lobe, or a rough one where a gather goes on, with this density: emission is weighted against next-event estimation (balance heuristic).
     Glossy {
         /// Density per solid angle with which the direction was sampled.
         pdf: f32,
@@ -41,7 +41,7 @@ pub enum Arrival {
         /// Shading normal there, on the lit side.
         normal: Vec3,
     },
-    /// From a weakly directional lobe: next-event estimation has all of it.
+    /// From another weakly directional lobe: next-event estimation has all of it.
     Soft,
 }
 

@@ -160,6 +160,14 @@ impl Bsdf {
         }
     }
 
+    /// Density with which [`Bsdf::sample_low`] chooses `incoming`, where rough reflection is all that is not diffuse; `None` elsewhere.
+    pub fn pdf_rough(&self, incoming: Vec3) -> Option<f32> {
+        let layered = self.layered.as_ref()?;
+        let rough = layered.albedo_rough() != Vec3::ZERO && layered.albedo_high() == Vec3::ZERO;
+        let above = self.geometric_normal.dot(incoming) > 0.0;
+        rough.then(|| if above { layered.eval_low(incoming).1 } else { 0.0 })
+    }
+
     /// `f_h cos` of the part of f_h that is no delta function, and its sampling density.
     pub fn eval_high(&self, incoming: Vec3) -> (Vec3, f32) {
         match &self.layered {

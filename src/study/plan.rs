@@ -17,6 +17,9 @@ pub const PAPER_BETA: f32 = 1.0 / TAU;
 /// office has about as many patches as the paper's: 74,924 on normal + complex surfaces, 1124 on normal + simple ones.
 pub const PAPER_PATCHES: (f32, u32) = (0.1, 7);
 
+/// Longest cluster in units of `r_thresh`: the paper's are pieces of furniture, of any length.
+pub const PAPER_CLUSTERS: f32 = 3.0;
+
 /// What a run is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -158,6 +161,7 @@ pub fn ladder(subject: &Subject, base: &Settings, auto: f32, extent: Extent) -> 
         box_fit: BoxFit::Paper1993,
         patch_size: Some(PAPER_PATCHES.0 * subject.length()),
         least_patches: PAPER_PATCHES.1,
+        longest_cluster: PAPER_CLUSTERS,
         ..gsii.clone()
     };
     let as_in_paper = |method| Settings { method, ..paper.clone() };

@@ -362,6 +362,8 @@ fn gsii_015_cluster_as_obstruction(case: &Case, out: &mut Outcome<'_>) {
     let settings = Settings {
         r_thresh: Some(0.3),
         beta: 0.3,
+        // The row of blocks is one obstruction, and longer than r_thresh.
+        longest_cluster: 3.0,
         patch_size: Some(0.5),
         radiosity_error: 0.01,
         ..Settings::default()
