@@ -30,12 +30,7 @@ use rustix::time::{ClockId, clock_gettime};
 type Recipe = fn(&Case, &mut Outcome<'_>);
 
 /// Cases that are known to fail, with the reason.
-const KNOWN: &[(&str, &str)] = &[(
-    "GSII-014",
-    "only with the paper's box fit, which is not the default, and inherent in it: light from light sources is stopped by the clutter \
-     itself, reflected light comes from its boxes, and the paper's intercept about the square of the share that the clutter does; \
-     see the note",
-)];
+const KNOWN: &[(&str, &str)] = &[];
 
 fn recipe(id: &str) -> Option<Recipe> {
     let all = [
