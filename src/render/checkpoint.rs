@@ -22,7 +22,7 @@ use crate::error::{Error, Result};
 use crate::unfinished::Listed;
 
 /// First line of the file; the number changes with the format.
-const MAGIC: &[u8] = b"gsii checkpoint 1\n";
+const MAGIC: &[u8] = b"gsii checkpoint 2\n";
 
 /// Longest value that a message quotes, characters.
 const QUOTED: usize = 48;

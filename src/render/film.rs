@@ -3,6 +3,7 @@
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
+use super::rare::{self, Brightest};
 use super::tally::Tally;
 use crate::sampling::{hash_all, unit};
 use crate::simplify::{Class, Simplified};
@@ -32,6 +33,29 @@ impl PixelSum {
         }
         self.trials += 1;
         self.even_trials += u32::from(even);
+    }
+
+    /// Puts another value in the place of a trial's.
+    pub fn replace(&mut self, old: Vec3, new: Vec3, even: bool) {
+        let [old, new] = [old, new].map(|v| v.to_array().map(f64::from));
+        for band in 0..3 {
+            let more = new[band] - old[band];
+            self.sum[band] += more;
+            self.square[band] += more * (new[band] + old[band]);
+            if even {
+                self.even[band] += more;
+            }
+        }
+    }
+
+    /// Makes every trial brighter: by `all` on average, those with even numbers by `even`.
+    pub fn raise(&mut self, all: [f64; 3], even: [f64; 3]) {
+        let (n, even_n) = (f64::from(self.trials), f64::from(self.even_trials));
+        for band in 0..3 {
+            self.square[band] += all[band] * (2.0 * self.sum[band] + n * all[band]);
+            self.sum[band] += n * all[band];
+            self.even[band] += even_n * even[band];
+        }
     }
 
     /// Number of trials.
@@ -136,6 +160,8 @@ pub struct Pixel {
     pub hires: PixelSum,
     /// Indirect light.
     pub lores: PixelSum,
+    /// The trials of LORES that may have to be shared with other pixels, where indirect light is interpolated.
+    pub brightest: Brightest,
     /// The first visible surface.
     pub feature: Feature,
 }
@@ -247,6 +273,12 @@ impl Film {
         let tiles = rows.flat_map(|y| columns.clone().map(move |x| Tile::new([x, y], size))).collect();
         let [width, height] = region.size();
         Film { width, height, origin: region.low, tiles }
+    }
+
+    /// The film as it is shown: what few trials bring is shared (see [`rare`]).
+    pub fn shared(mut self) -> Self {
+        self.tiles.iter_mut().for_each(rare::share);
+        self
     }
 
     /// All pixels row by row.

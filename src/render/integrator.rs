@@ -190,6 +190,9 @@ impl<'a> World<'a> {
                 }
                 if batch.passes.lores {
                     pixel.lores.add(l, even);
+                    if self.cache.is_some() {
+                        pixel.brightest.offer(l, even);
+                    }
                 }
             }
         }

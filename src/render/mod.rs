@@ -10,6 +10,7 @@ pub mod layers;
 pub mod nearness;
 pub mod path;
 pub mod plan;
+pub mod rare;
 mod rounds;
 pub mod session;
 pub mod show;
@@ -150,7 +151,7 @@ pub fn render_rounds(
         let complete = renderer.round(&tiles, &plan.allocations, range.end, &|n| bar.inc(n));
         let Tally { rays, times } = tiles.tally();
         film.tiles = tiles.into_tiles();
-        if !complete || !watch(&Round { film: &film, trials: range.end, rays, times }) {
+        if !complete || !watch(&Round { film: &film.clone().shared(), trials: range.end, rays, times }) {
             break;
         }
     }

@@ -108,7 +108,7 @@ impl Session {
     /// The image as it is now.
     pub fn film(&self) -> Film {
         let [width, height] = self.region.size();
-        Film { width, height, origin: self.region.low, tiles: self.tiles.to_vec() }
+        Film { width, height, origin: self.region.low, tiles: self.tiles.to_vec() }.shared()
     }
 
     /// The film and what it cost.
@@ -117,7 +117,7 @@ impl Session {
         let mut tally = self.tiles.tally();
         tally += self.plan.as_ref().map_or_else(|| self.others.tally(), |plan| plan.others);
         let [width, height] = self.region.size();
-        let film = Film { width, height, origin: self.region.low, tiles: self.tiles.into_tiles() };
+        let film = Film { width, height, origin: self.region.low, tiles: self.tiles.into_tiles() }.shared();
         let filling = self.filling;
         Rendering {
             film,
