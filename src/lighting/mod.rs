@@ -8,6 +8,7 @@ mod bilinear;
 mod bounds;
 mod emission;
 mod environment;
+pub mod guide;
 mod openings;
 pub(crate) mod punctual;
 pub mod shadow;

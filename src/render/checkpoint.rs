@@ -19,6 +19,7 @@ use super::tally::Tally;
 use super::{IrradianceCache, RenderParams};
 use crate::clock::Spent;
 use crate::error::{Error, Result};
+use crate::lighting::guide::LightGuide;
 use crate::unfinished::Listed;
 
 /// First line of the file; the number changes with the format.
@@ -100,6 +101,7 @@ struct TileOut<'a> {
     dropped: u64,
     tally: Tally,
     pixels: &'a [Pixel],
+    guide: &'a LightGuide,
 }
 
 /// The same, read.
@@ -109,6 +111,7 @@ struct TileIn {
     dropped: u64,
     tally: Tally,
     pixels: Vec<Pixel>,
+    guide: LightGuide,
 }
 
 /// Where the file is written before it gets its name. Always the same name, so that a process which was killed leaves one at most.
@@ -162,7 +165,8 @@ fn write_to(path: &Path, identity: &Identity, session: &Session) -> io::Result<(
     })?;
     for tile in session.others.iter().chain(session.tiles.iter()) {
         let pixels = if tile.next > 0 { tile.pixels.as_slice() } else { &[] };
-        frames.encode(&TileOut { next: tile.next, dropped: tile.dropped, tally: tile.tally, pixels })?;
+        let guide = &tile.guide;
+        frames.encode(&TileOut { next: tile.next, dropped: tile.dropped, tally: tile.tally, pixels, guide })?;
         // The disk may be slow; whoever works on the tile shall not wait for it.
         drop(tile);
         frames.write()?;
@@ -244,14 +248,14 @@ fn session(frames: &mut Reader, params: &RenderParams) -> std::result::Result<Se
 
 fn tiles(frames: &mut Reader, mut empty: Vec<Tile>) -> std::result::Result<SharedTiles, String> {
     for tile in &mut empty {
-        let TileIn { next, dropped, tally, pixels } = frames.get()?;
-        if next > 0 && pixels.len() != tile.pixels.len() {
+        let TileIn { next, dropped, tally, pixels, guide } = frames.get()?;
+        if (next > 0 && pixels.len() != tile.pixels.len()) || !guide.is_sound() {
             return Err("a tile has another size".to_owned());
         }
         if next > 0 {
             tile.pixels = pixels;
         }
-        (tile.next, tile.dropped, tile.tally) = (next, dropped, tally);
+        (tile.next, tile.dropped, tile.tally, tile.guide) = (next, dropped, tally, guide);
     }
     Ok(SharedTiles::new(empty))
 }

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::rare::{self, Brightest};
 use super::tally::Tally;
+use crate::lighting::guide::LightGuide;
 use crate::sampling::{hash_all, unit};
 use crate::simplify::{Class, Simplified};
 
@@ -224,6 +225,8 @@ pub struct Tile {
     pub size: [u32; 2],
     /// Pixels row by row.
     pub pixels: Vec<Pixel>,
+    /// Where its points find light.
+    pub guide: LightGuide,
     /// Trials that were not finite and were dropped.
     pub dropped: u64,
     /// The trial to go on with: those with smaller numbers are in the sums, as far as they are planned.
@@ -238,7 +241,7 @@ impl Tile {
         let origin = place.map(|p| p * TILE);
         let size = [0, 1].map(|axis| TILE.min(size[axis] - origin[axis]));
         let pixels = vec![Pixel::default(); (size[0] * size[1]) as usize];
-        Tile { origin, size, pixels, dropped: 0, next: 0, tally: Tally::default() }
+        Tile { origin, size, pixels, guide: LightGuide::default(), dropped: 0, next: 0, tally: Tally::default() }
     }
 
     /// Column and row of its pixel number `i`.

@@ -30,6 +30,7 @@ use super::view::ViewRays;
 use super::workspace::Workspace;
 use crate::backend::edge::settle_edges;
 use crate::backend::{Coherence, Hit, Ray, RayScene, Visible};
+use crate::lighting::guide::Guided;
 use crate::lighting::shadow::{ShadowRay, light_visibility};
 use crate::lighting::{LightSample, Lights, Lit};
 use crate::radiosity::Solution;
@@ -63,6 +64,9 @@ const MET_AT_ONCE: usize = 256;
 
 /// Share of paths that gather rough reflection apart from diffuse, per unit of its albedo.
 const PATHS_PER_ALBEDO: f32 = 4.0;
+
+/// From this trial on a tile remembers where it finds light: images of fewer trials have no use for that.
+pub(super) const LEARN_FROM: u32 = 16;
 
 /// Everything that does not change while an image is rendered.
 #[derive(Clone, Copy)]
@@ -163,6 +167,7 @@ impl<'a> World<'a> {
         let trials = batch.pixels.len() * batch.trials as usize;
         ws.start(trials);
         let view = ViewRays::new(camera, image_size, batch.seed);
+        ws.guide = (batch.first >= LEARN_FROM).then(|| std::mem::take(&mut tile.guide));
         ws.cone = view.cone();
         for (place, &pixel) in (0..).zip(batch.pixels) {
             ws.paths.extend(view.paths(tile.pixel(pixel), batch.first, batch.trials, place * batch.trials));
@@ -172,6 +177,7 @@ impl<'a> World<'a> {
             ws.features.resize(trials, Feature::default());
         }
         self.run(ws, batch.passes, None);
+        tile.guide = ws.guide.take().unwrap_or_default();
         for (place, &pixel) in batch.pixels.iter().enumerate() {
             let pixel = &mut tile.pixels[pixel as usize];
             for t in 0..batch.trials {
@@ -393,11 +399,16 @@ impl<'a> World<'a> {
         };
         let wanted = if path.gathers { passes.lores } else { passes.hires };
         let lit = look_up.is_none() && wanted && path.depth < self.max_depth && !self.lights.is_empty();
-        if lit {
+        let lit = lit.then(|| {
             let [choice, u, v, _] = sobol(path.index, path.block(), path.stream);
             let normal = point.shading_normal_towards(-path.ray.direction);
-            ws.lit.push(Lit { position: point.position, normal, u: [choice, u, v] });
-        }
+            let guided = match &mut ws.guide {
+                Some(guide) if !path.gathers => guide.draw([choice, u, v]),
+                _ => Guided::plain([choice, u, v]),
+            };
+            ws.lit.push(Lit { position: point.position, normal, u: guided.u });
+            guided
+        });
         ws.met.push(Met { path: index, hit: *hit, look_up, point, lit });
         if ws.met.len() == MET_AT_ONCE {
             self.shade_all(ws, passes, capture);
@@ -410,7 +421,7 @@ impl<'a> World<'a> {
         let (mut met, mut lights) = (std::mem::take(&mut ws.met), std::mem::take(&mut ws.lights));
         let mut sampled = lights.drain(..);
         for met in &met {
-            let light = if met.lit { sampled.next().flatten() } else { None };
+            let light = if met.lit.is_some() { sampled.next().flatten() } else { None };
             self.shade(ws, met, light.as_ref(), passes, capture);
         }
         drop(sampled);
@@ -468,8 +479,9 @@ impl<'a> World<'a> {
         };
         // Paths from rough reflection have a share in light sources where nothing is interpolated.
         let shares = path.gathers && unbending.is_none();
-        if let Some(light) = light {
-            shine(ws, &path, point, self.scattered(&bsdf, unbending.as_ref(), shares, light), light);
+        if let (Some(light), Some(guided)) = (light, met.lit) {
+            let scattered = self.scattered(&bsdf, unbending.as_ref(), shares, light);
+            shine(ws, &path, point, scattered, light, guided);
         }
         let wanted = if path.gathers { passes.lores } else { passes.hires || capture.is_some() };
         if let Some(caustics) = self.caustics.filter(|_| wanted && look_up.is_none()) {
@@ -599,7 +611,11 @@ impl<'a> World<'a> {
         light_visibility(self.detailed, self.scene, None, rays, coherence, buffers, &mut ws.transmittance);
         for (s, share) in ws.shadows.iter().zip(&ws.transmittance) {
             let sum = if s.gathers { &mut ws.lores } else { &mut ws.hires };
-            sum[s.trial as usize] += s.radiance * *share;
+            let radiance = s.radiance * *share;
+            sum[s.trial as usize] += radiance * s.guided.factor;
+            if let Some(guide) = &mut ws.guide {
+                guide.found(&s.guided, radiance.element_sum());
+            }
             if s.gathers {
                 ws.counts.shadow_lores += 1;
             } else {
@@ -610,14 +626,14 @@ impl<'a> World<'a> {
 }
 
 /// Next-event estimation: a shadow ray to a sampled light source, whose light is `scattered` (`f cos`).
-fn shine(ws: &mut Workspace, path: &Path, point: &SurfacePoint, scattered: Vec3, light: &LightSample) {
+fn shine(ws: &mut Workspace, path: &Path, point: &SurfacePoint, scattered: Vec3, light: &LightSample, guided: Guided) {
     let radiance = path.throughput * scattered * light.weight;
     if radiance == Vec3::ZERO {
         return;
     }
     let ray = Ray { t_far: light.distance, ..Ray::new(point.ray_origin(light.direction), light.direction) };
     ws.shadow_rays.push(ShadowRay { ray, light: light.triangle });
-    ws.shadows.push(Shadow { radiance, trial: path.trial, gathers: path.gathers });
+    ws.shadows.push(Shadow { radiance, trial: path.trial, gathers: path.gathers, guided });
 }
 
 /// Ends a path that brings little, or strengthens it by as much as others end; `u` in 0..1. Nothing is lost on average.

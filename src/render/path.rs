@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use crate::backend::{Hit, Ray};
+use crate::lighting::guide::Guided;
 use crate::shading::SurfacePoint;
 
 /// Blocks of four random numbers for each scattering event: one for light, one for the path.
@@ -103,6 +104,8 @@ pub struct Shadow {
     pub trial: u32,
     /// Whether it goes to LORES.
     pub gathers: bool,
+    /// How its light source was chosen.
+    pub guided: Guided,
 }
 
 /// Where a path's ray met a surface of the scene.
@@ -116,6 +119,6 @@ pub struct Met {
     pub look_up: Option<u32>,
     /// The point.
     pub point: SurfacePoint,
-    /// Whether its light is sampled.
-    pub lit: bool,
+    /// Whether its light is sampled, and how the random numbers for that came about.
+    pub lit: Option<Guided>,
 }

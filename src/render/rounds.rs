@@ -6,7 +6,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::film::Tile;
-use super::integrator::{Batch, World};
+use super::integrator::{Batch, LEARN_FROM, World};
 use super::path::Passes;
 use super::plan::{self, Allocation, Plan};
 use super::session::{Session, SharedTiles};
@@ -137,6 +137,9 @@ impl Renderer<'_> {
                 if (self.over)() {
                     return false;
                 }
+                if tile.next > LEARN_FROM && tile.next.is_power_of_two() {
+                    tile.guide.learn();
+                }
                 (ws.counts, ws.times) = Default::default();
                 for (passes, pixels) in &slice.pixels {
                     let (first, trials, seed) = (tile.next, slice.trials, self.params.trial_seed());
@@ -176,6 +179,8 @@ impl Slice {
         };
         let pixels = [Passes::BOTH, Passes::HIRES, Passes::LORES].map(with);
         let count: u32 = pixels.iter().map(|(_, list)| list.len() as u32).sum();
+        // Tiles learn where light is after numbers of trials that double, whatever is planned.
+        let end = end.min((first + 1).max(LEARN_FROM).next_power_of_two());
         // No pixel is to be overtaken by the limits of its passes.
         let limits = plan.iter().flat_map(|a| [a.hires, a.lores]).filter(|&limit| limit > first);
         let limit = limits.min().unwrap_or(first).min(end);

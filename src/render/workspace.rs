@@ -7,6 +7,7 @@ use super::film::Feature;
 use super::path::{Met, Path, Shadow};
 use super::tally::{PassTimes, RayCounts};
 use crate::backend::{Hit, Ray};
+use crate::lighting::guide::LightGuide;
 use crate::lighting::shadow::{ShadowBuffers, ShadowRay};
 use crate::lighting::{LightSample, Lit};
 
@@ -34,6 +35,8 @@ pub struct Workspace {
     pub(super) features: Vec<Feature>,
     /// How far each trial's first ray went; empty when nobody wants to know.
     pub(super) distances: Vec<f32>,
+    /// Where the points that view rays meet find light, where they ask for it.
+    pub(super) guide: Option<LightGuide>,
     /// What the irradiance cache says around the points of this batch.
     pub(super) nearby: Nearby,
     /// Width of a pixel at the start of view rays and its growth over distance; zero reads textures at their full resolution.
@@ -80,6 +83,7 @@ impl Workspace {
         self.features.clear();
         self.distances.clear();
         self.nearby.clear();
+        self.guide = None;
         self.cone = [0.0; 2];
         for sums in [&mut self.hires, &mut self.lores] {
             sums.clear();
