@@ -25,7 +25,7 @@ impl IrradianceCache {
         let mut cache = IrradianceCache { passes: PASSES.len(), ..IrradianceCache::default() };
         let Some(far) = &world.far else { return cache };
         for (pass, (spacing, rays)) in (0u32..).zip(PASSES) {
-            let strata = Strata::of(rays);
+            let strata = Strata::of(rays * cache.rays_for_noise());
             for (number, (camera, size)) in (0u32..).zip(views) {
                 let view = ViewRays::new(camera, *size, hash_all(&[seed, STREAM, number]));
                 let places = cache.places(world, &view, *size, spacing, pass);
@@ -33,7 +33,7 @@ impl IrradianceCache {
                     .into_par_iter()
                     .map_init(Workspace::default, |ws, place| {
                         let stream = hash_all(&[seed, STREAM, pass, number, place as u32]);
-                        if over() { None } else { gather(world, far, ws, &places[place], strata, stream) }
+                        if over() { None } else { gather(world, far, ws, &places[place], strata, stream, pass == 0) }
                     })
                     .collect();
                 if fresh.iter().any(Option::is_some) {

@@ -39,6 +39,11 @@ const ERROR: f32 = 0.015;
 /// Factors that the number of rays is kept between.
 const RAYS: [f32; 2] = [0.25, 4.0];
 
+/// Relative standard deviation of a record's single ray for which records have so many rays. They get more in proportion to it, as is best where
+/// the rest of the work has a noise of its own (Neyman), but at most so many times as many.
+const DEVIATION: f32 = 0.5;
+const MOST_RAYS: f32 = 3.0;
+
 /// A place that has less weight of records than this gets one of its own.
 const COVERED: f32 = 0.4;
 
@@ -56,6 +61,9 @@ const LEAST_PIXELS: f32 = 3.0;
 
 /// Places at which light is gathered between two looks at what there is.
 const CHUNK: usize = 4096;
+
+/// Keeps the second gather of a place apart from the first.
+const TWICE: u32 = 0x7477_6963;
 
 /// Keeps the cache's random numbers apart from the image's.
 const STREAM: u32 = 0x6361_6368;
@@ -119,7 +127,7 @@ impl IrradianceCache {
         let view = ViewRays::new(camera, size, hash_all(&[seed, STREAM]));
         while let Some(&(spacing, rays)) = PASSES.get(self.passes) {
             let pass = self.passes as u32;
-            let strata = Strata::of(rays * rays_for(params.error));
+            let strata = Strata::of(rays * rays_for(params.error) * self.rays_for_noise());
             let places = self.places(world, &view, size, spacing, pass);
             while self.next < places.len() {
                 let chunk = self.next..(self.next + CHUNK).min(places.len());
@@ -128,7 +136,7 @@ impl IrradianceCache {
                     .into_par_iter()
                     .map_init(Workspace::default, |ws, number| {
                         let stream = hash_all(&[seed, STREAM, pass, number as u32]);
-                        if over() { None } else { gather(world, far, ws, &places[number], strata, stream) }
+                        if over() { None } else { gather(world, far, ws, &places[number], strata, stream, pass == 0) }
                     })
                     .collect();
                 if over() {
@@ -150,6 +158,17 @@ impl IrradianceCache {
             }
         }
         true
+    }
+
+    /// Factor on the rays of records by how noisy those of the first pass are.
+    fn rays_for_noise(&self) -> f32 {
+        let (mut sum, mut count) = (0.0, 0);
+        for variance in self.records.iter().filter_map(|record| record.variance) {
+            sum += variance;
+            count += 1;
+        }
+        let deviation = (sum / count.max(1) as f32).sqrt();
+        (deviation / DEVIATION).clamp(1.0, MOST_RAYS)
     }
 
     /// Diffuse places at the pixels of a grid that the records so far do not cover.
@@ -251,23 +270,31 @@ fn gather(
     place: &Place,
     strata: Strata,
     stream: u32,
+    twice: bool,
 ) -> Option<Record> {
     let Captured { point, normal, .. } = &place.captured;
     let frame = basis(*normal);
-    let paths: Vec<Path> = strata
-        .in_blocks()
-        .map(|k| {
-            let [u, v, near, _] = sobol(k as u32, 0, stream);
-            let direction = strata.direction(&frame, k, [u, v]);
-            Path {
-                near: far.r_thresh * (0.5 + near),
-                arrival: Arrival::Soft,
-                gathers: true,
-                depth: 1,
-                ..Path::view(Ray::new(point.ray_origin(direction), direction), k as u32, k as u32, stream)
-            }
-        })
-        .collect();
-    let (radiance, distances) = world.gather_with_distances(ws, &paths, strata.len());
-    Record::new(point.position, *normal, LEAST_PIXELS * place.footprint, strata, radiance, distances)
+    let mut once = |stream: u32| {
+        let paths: Vec<Path> = strata
+            .in_blocks()
+            .map(|k| {
+                let [u, v, near, _] = sobol(k as u32, 0, stream);
+                let direction = strata.direction(&frame, k, [u, v]);
+                Path {
+                    near: far.r_thresh * (0.5 + near),
+                    arrival: Arrival::Soft,
+                    gathers: true,
+                    depth: 1,
+                    ..Path::view(Ray::new(point.ray_origin(direction), direction), k as u32, k as u32, stream)
+                }
+            })
+            .collect();
+        let (radiance, distances) = world.gather_with_distances(ws, &paths, strata.len());
+        Record::new(point.position, *normal, LEAST_PIXELS * place.footprint, strata, radiance, distances)
+    };
+    let record = once(stream)?;
+    if !twice {
+        return Some(record);
+    }
+    once(hash_all(&[stream, TWICE])).map(|again| record.averaged(&again, strata.len()))
 }

@@ -76,6 +76,8 @@ pub(super) struct Record {
     pub refuses: bool,
     /// Irradiance over pi: the radiance that a white diffuse surface reflects, W/(sr m^2).
     pub radiance: Vec3,
+    /// Variance of what a single ray brings, over the square of its mean, bands together: known where two records were made into one.
+    pub variance: Option<f32>,
     /// Change of each band with the normal: scalar product with the axis of rotation times its sine.
     pub by_rotation: [Vec3; 3],
     /// Change of each band with the position.
@@ -152,9 +154,28 @@ impl Record {
             least_reach,
             refuses: false,
             radiance: mean,
+            variance: None,
             by_rotation,
             by_translation,
         })
+    }
+
+    /// This one and `other`, of the same place and as many rays, in one.
+    pub fn averaged(&self, other: &Record, rays: usize) -> Record {
+        let half = |a: Vec3, b: Vec3| 0.5 * (a + b);
+        let halves = |a: [Vec3; 3], b: [Vec3; 3]| [0, 1, 2].map(|i| half(a[i], b[i]));
+        let (sum, difference) =
+            ((self.radiance + other.radiance).element_sum(), (self.radiance - other.radiance).element_sum());
+        Record {
+            // Harmonic, as of all rays together.
+            distance: 2.0 / (1.0 / self.distance + 1.0 / other.distance),
+            radiance: half(self.radiance, other.radiance),
+            // Of the mean of two it is (difference / sum)^2.
+            variance: (sum > 0.0).then(|| (difference / sum).powi(2) * 2.0 * rays as f32),
+            by_rotation: halves(self.by_rotation, other.by_rotation),
+            by_translation: halves(self.by_translation, other.by_translation),
+            ..*self
+        }
     }
 
     /// Whether all numbers in it are possible.
