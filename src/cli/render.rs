@@ -20,6 +20,7 @@ use crate::pipeline::identity::identity;
 use crate::pipeline::{Method, Prepared, Stats, choose_camera_among};
 use crate::progress::Progress;
 use crate::render::checkpoint::LateIdentity;
+use crate::render::film::Pixel;
 use crate::render::layers::{Layer, develop};
 use crate::render::{Region, RenderParams, Rendering, Session, World, bias};
 use crate::scene::{Camera, Scene};
@@ -30,6 +31,9 @@ const ERROR: f32 = 0.03;
 
 /// How much larger the error of single pixels may be than that of the image: what is left of noise is grain, not specks.
 const WORST_PIXEL: f32 = 4.0;
+
+/// An error is missed when it is so many times what was asked for: it is itself known to some per cent.
+const MISSED: f64 = 1.1;
 
 /// Relative error of a pixel in the paper.
 const PIXEL_ERROR: f32 = 0.05;
@@ -284,6 +288,7 @@ impl Options {
             kept.remove()?;
         }
         self.summarise(&view.outputs, stats, rendering.stopped.then_some(advice.as_str()));
+        self.say_what_is_missing(&rendering, params, stats);
         Ok(true)
     }
 
@@ -435,6 +440,23 @@ impl Options {
             errors += &format!(", {} trials dropped because they were not finite", stats.counts.dropped_trials);
         }
         self.talk.say(errors);
+    }
+
+    /// Where the error that was asked for was not reached because pixels may not have more trials.
+    fn say_what_is_missing(&self, rendering: &Rendering, params: &RenderParams, stats: &Stats) {
+        let missed = stats.error.total > MISSED * f64::from(params.error);
+        if rendering.stopped || !missed {
+            return;
+        }
+        let most = |p: &Pixel| p.hires.trials().max(p.lores.trials()) >= params.max_trials;
+        let (ended, all) = (rendering.film.pixels().filter(|p| most(p)).count(), rendering.film.pixels().count());
+        let percent = 100.0 * ended as f64 / all as f64;
+        if percent >= 1.0 {
+            self.talk.say(format!(
+                "{:.0} % of the pixels had all {} trials before the image came to the {} % asked for: --max-trials N for more",
+                percent, params.max_trials, 100.0 * params.error
+            ));
+        }
     }
 }
 
