@@ -8,9 +8,9 @@ use rayon::prelude::*;
 
 use super::RenderParams;
 use super::caustics::Caustics;
-use super::integrator::World;
 use super::path::Path;
 use super::workspace::Workspace;
+use super::world::World;
 use crate::sampling::{hash_all, sobol};
 use crate::scene::{Camera, Lens};
 use crate::shading::Lobes;

@@ -18,6 +18,7 @@ pub mod tally;
 pub mod view;
 pub mod watch;
 pub mod workspace;
+pub mod world;
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -25,7 +26,6 @@ use std::time::{Duration, Instant};
 pub use cache::IrradianceCache;
 pub use caustics::Caustics;
 pub use film::{Film, Region};
-pub use integrator::{FarField, World};
 pub use nearness::Nearness;
 use plan::Plan;
 use rounds::{Renderer, doubling, fill_cache};
@@ -35,6 +35,7 @@ use tally::Tally;
 pub use tally::{PassTimes, RayCounts};
 pub use watch::{Moment, Watcher};
 pub use workspace::Workspace;
+pub use world::{FarField, World};
 
 use crate::progress::Progress;
 use crate::sampling::hash_all;

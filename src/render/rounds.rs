@@ -6,13 +6,14 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::film::Tile;
-use super::integrator::{Batch, LEARN_FROM, World};
+use super::integrator::LEARN_FROM;
 use super::path::Passes;
 use super::plan::{self, Allocation, Plan};
 use super::session::{Session, SharedTiles};
 use super::tally::Tally;
 use super::watch::{Moment, Watcher, watched};
 use super::workspace::Workspace;
+use super::world::{Batch, World};
 use super::{BATCH_TRIALS, IrradianceCache, RenderParams};
 use crate::clock::Stopwatch;
 use crate::progress::Progress;

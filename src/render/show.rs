@@ -5,9 +5,9 @@ use std::time::Duration;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::integrator::{FarField, World};
 use super::tally::{PassTimes, RayCounts};
 use super::view::ViewRays;
+use super::world::{FarField, World};
 use super::{RenderParams, Rendering};
 use crate::backend::{Coherence, Hit, Ray, Visible};
 use crate::clock::Stopwatch;

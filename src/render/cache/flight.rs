@@ -7,9 +7,9 @@
 use rayon::prelude::*;
 
 use super::{IrradianceCache, PASSES, Record, STREAM, Strata, gather};
-use crate::render::integrator::World;
 use crate::render::view::ViewRays;
 use crate::render::workspace::Workspace;
+use crate::render::world::World;
 use crate::sampling::hash_all;
 use crate::scene::Camera;
 

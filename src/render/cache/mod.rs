@@ -16,10 +16,10 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::RenderParams;
-use super::integrator::{Captured, FarField, World};
 use super::path::{Arrival, Path};
 use super::view::ViewRays;
 use super::workspace::Workspace;
+use super::world::{Captured, FarField, World};
 use crate::backend::Ray;
 use crate::sampling::{basis, hash_all, sobol};
 use crate::scene::Camera;
