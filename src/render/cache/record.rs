@@ -220,7 +220,7 @@ impl Record {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sampling::sobol;
+    use crate::sampling::{hash_all, sobol};
 
     /// A record at `position` in a world where a ray brings what `radiance` says of its origin and direction, from a distance.
     fn record(position: Vec3, normal: Vec3, stream: u32, world: &dyn Fn(Vec3, Vec3) -> (f32, f32)) -> Record {
@@ -259,6 +259,23 @@ mod tests {
             // A stratified mean of 768, and the cosine of 0.3 that a gradient leaves out
             assert!((found - expected).abs() < 0.02, "{angle}: {found} {expected}");
         }
+    }
+
+    /// Light of one half or three halves from each direction by chance: a ray is off by half of the mean.
+    #[test]
+    fn two_records_tell_how_far_a_ray_is_off() {
+        let chance = |_: Vec3, d: Vec3| (0.5 + (hash_all(&d.to_array().map(f32::to_bits)) & 1) as f32, 1.0);
+        let count = 400;
+        let of_pair = |i: u32| {
+            let [a, b] = [2 * i, 2 * i + 1].map(|stream| record(Vec3::ZERO, Vec3::Z, stream, &chance));
+            let both = a.averaged(&b, 768);
+            assert!((both.radiance - 0.5 * (a.radiance + b.radiance)).length() < 1e-6);
+            both.variance.unwrap()
+        };
+        let variance = (0..count).map(of_pair).sum::<f32>() / count as f32;
+        // A square of a normal number has the relative standard deviation sqrt(2): five of them, of the mean of so many.
+        let error = 5.0 * (2.0 / count as f32).sqrt();
+        assert!((variance / 0.25 - 1.0).abs() < error, "{variance}");
     }
 
     /// A ceiling whose light varies along x: the gradient against the difference of records made at both sides.
