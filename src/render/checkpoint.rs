@@ -328,9 +328,9 @@ mod tests {
 
     fn params() -> RenderParams {
         RenderParams {
-            width: 11,
+            width: 34,
             height: 2,
-            region: Some(Region { low: [0, 0], high: [8, 2] }),
+            region: Some(Region { low: [0, 0], high: [32, 2] }),
             min_trials: 4,
             max_trials: 64,
             error: 0.1,

@@ -1,6 +1,9 @@
 //! Where trials are added up: mean and standard error per pixel, band and pass.
 
+use std::collections::BTreeMap;
+
 use glam::Vec3;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::rare::{self, Brightest};
@@ -11,6 +14,9 @@ use crate::simplify::{Class, Simplified};
 
 /// Pixels along each edge of a film tile.
 pub const TILE: u32 = 8;
+
+/// Pixels along each edge of a block: tiles that share rare light.
+const BLOCK: u32 = 4 * TILE;
 
 /// Running sums of one pass at one pixel, f64.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
@@ -195,8 +201,16 @@ impl Region {
         [0, 1].map(|axis| self.high[axis] - self.low[axis])
     }
 
-    /// Part `number` (from 0) of `parts` that an image is cut into, along the borders of film tiles; `None` when it has less tiles
-    /// across or down than parts are needed there.
+    /// Columns and rows of the tiles that its pixels depend on, in an image of `size` pixels: those of all blocks that it touches.
+    pub fn tiles(&self, size: [u32; 2]) -> [std::ops::Range<u32>; 2] {
+        [0, 1].map(|axis| {
+            let high = self.high[axis].next_multiple_of(BLOCK).min(size[axis]);
+            self.low[axis] / BLOCK * BLOCK / TILE..high.div_ceil(TILE)
+        })
+    }
+
+    /// Part `number` (from 0) of `parts` that an image is cut into, along the borders of blocks, or of film tiles where there are less blocks than
+    /// parts; `None` when it has less tiles across or down than parts are needed there.
     pub fn part(number: u32, parts: u32, size: [u32; 2]) -> Option<Self> {
         // As many across as makes the parts most nearly square.
         let wide = |across: &u32| {
@@ -207,9 +221,10 @@ impl Region {
         let across = divisors.min_by(|a, b| wide(a).total_cmp(&wide(b)))?;
         let grid = [across, parts / across];
         let place = [number % across, number / across];
-        let tiles = size.map(|n| n.div_ceil(TILE));
+        let unit = if (0..2).all(|axis| size[axis].div_ceil(BLOCK) >= grid[axis]) { BLOCK } else { TILE };
+        let units = size.map(|n| n.div_ceil(unit));
         let border =
-            |axis: usize, i: u32| (u64::from(tiles[axis]) * u64::from(i) / u64::from(grid[axis])) as u32 * TILE;
+            |axis: usize, i: u32| (u64::from(units[axis]) * u64::from(i) / u64::from(grid[axis])) as u32 * unit;
         let low = [0, 1].map(|axis| border(axis, place[axis]));
         let high = [0, 1].map(|axis| border(axis, place[axis] + 1).min(size[axis]));
         (low[0] < high[0] && low[1] < high[1]).then_some(Region { low, high })
@@ -259,7 +274,7 @@ pub struct Film {
     pub height: u32,
     /// Left and top pixel within the whole image.
     pub origin: [u32; 2],
-    /// Tiles, row by row: all those of the whole image that hold a pixel of this film. Tiles are rendered whole, so that a
+    /// Tiles, row by row: all those of the whole image in blocks that hold a pixel of this film. They are rendered whole, so that a
     /// pixel does not depend on which part of the image it is rendered for.
     pub tiles: Vec<Tile>,
 }
@@ -272,7 +287,7 @@ impl Film {
 
     /// An empty film of a part of an image of `size`.
     pub fn of(region: Region, size: [u32; 2]) -> Self {
-        let [rows, columns] = [1, 0].map(|axis| region.low[axis] / TILE..region.high[axis].div_ceil(TILE));
+        let [columns, rows] = region.tiles(size);
         let tiles = rows.flat_map(|y| columns.clone().map(move |x| Tile::new([x, y], size))).collect();
         let [width, height] = region.size();
         Film { width, height, origin: region.low, tiles }
@@ -280,17 +295,21 @@ impl Film {
 
     /// The film as it is shown: what few trials bring is shared (see [`rare`]).
     pub fn shared(mut self) -> Self {
-        self.tiles.iter_mut().for_each(rare::share);
+        let mut blocks = BTreeMap::<[u32; 2], Vec<&mut Tile>>::new();
+        for tile in &mut self.tiles {
+            blocks.entry(tile.origin.map(|low| low / BLOCK)).or_default().push(tile);
+        }
+        blocks.into_par_iter().for_each(|(_, mut tiles)| rare::share(&mut tiles));
         self
     }
 
     /// All pixels row by row.
     pub fn pixels(&self) -> impl Iterator<Item = &Pixel> {
-        let first = self.origin.map(|low| low / TILE);
-        let across = (self.origin[0] + self.width).div_ceil(TILE) - first[0];
+        let [first_column, first_row] = self.tiles.first().map_or([0; 2], |tile| tile.origin.map(|low| low / TILE));
+        let across = self.tiles.iter().take_while(|tile| tile.origin[1] / TILE == first_row).count() as u32;
         (self.origin[1]..self.origin[1] + self.height).flat_map(move |y| {
             (self.origin[0]..self.origin[0] + self.width).map(move |x| {
-                let tile = &self.tiles[((y / TILE - first[1]) * across + x / TILE - first[0]) as usize];
+                let tile = &self.tiles[((y / TILE - first_row) * across + x / TILE - first_column) as usize];
                 &tile.pixels[((y % TILE) * tile.size[0] + x % TILE) as usize]
             })
         })
@@ -401,7 +420,9 @@ mod tests {
             }
             assert!(seen.iter().all(|n| *n == 1), "{size:?} in {parts}");
         }
-        assert_eq!(Region::part(0, 4, [200, 100]).unwrap().size(), [96, 48]);
+        assert_eq!(Region::part(0, 4, [200, 100]).unwrap().size(), [96, 64]);
+        assert_eq!(Region::part(0, 4, [40, 40]).unwrap().size(), [32, 32]);
+        assert_eq!(Region::part(0, 16, [40, 40]).unwrap().size(), [8, 8]);
         assert!((0..8).any(|i| Region::part(i, 8, [8, 8]).is_none()), "there is but one tile");
     }
 }

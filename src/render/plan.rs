@@ -110,10 +110,9 @@ fn place(tile: &Tile) -> [u32; 2] {
 /// image: its neighbours, and a sample of all.
 pub fn other_tiles(region: Region, params: &RenderParams) -> Vec<Tile> {
     let grid = Grid::new(params);
-    let low = region.low.map(|low| low / TILE);
-    let high = region.high.map(|high| high.div_ceil(TILE));
+    let own = region.tiles([params.width, params.height]);
     let within = |margin: u32, p: [u32; 2]| {
-        (0..2).all(|axis| (low[axis].saturating_sub(margin)..high[axis] + margin).contains(&p[axis]))
+        (0..2).all(|axis| (own[axis].start.saturating_sub(margin)..own[axis].end + margin).contains(&p[axis]))
     };
     let all = (0..grid.down).flat_map(|y| (0..grid.across).map(move |x| [x, y]));
     let wanted = all.filter(|&p| !within(0, p) && (within(1, p) || grid.is_sampled(p)));

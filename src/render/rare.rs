@@ -1,16 +1,16 @@
-//! Light that few trials bring is shared among the pixels of a tile.
+//! Light that few trials bring is shared among the pixels of a block of tiles.
 //!
 //! Indirect light changes little from pixel to pixel, but some of it arrives on paths that hardly any trial finds: a sunlit sill in a dull
 //! reflection, the reflection of a lamp in a vase. A pixel that happens to have such a trial is a bright speck, and those around it are a
 //! little too dark. The brightest trials of each pixel are therefore kept apart, and what makes them stand out of the noise is
-//! given to all pixels of the tile, in proportion to the indirect light that they have without it and most to those that are
-//! as bright as the one it came from. Nothing is lost: the tile's sum stays what it was, as does its expected value, but this part
-//! of it is as blurred as a tile is wide. (Zirr, Hanika, Dachsbacher 2018 tell such trials apart in the same way but weaken them.)
+//! given to all pixels of the block, in proportion to the indirect light that they have without it and most to those that are
+//! as bright as the one it came from. Nothing is lost: the block's sum stays what it was, as does its expected value, but this part
+//! of it is as blurred as a block is wide. (Zirr, Hanika, Dachsbacher 2018 tell such trials apart in the same way but weaken them.)
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::film::{Pixel, PixelSum, TILE, Tile};
+use super::film::{Pixel, PixelSum, Tile};
 
 /// Brightest trials that each pixel keeps.
 const KEPT: usize = 4;
@@ -42,7 +42,7 @@ impl Brightest {
     }
 }
 
-/// What the pixels of a tile are judged by, means over bands.
+/// What the pixels of some tiles are judged by, means over bands.
 struct Judge {
     /// Indirect light around a pixel.
     usual: Vec<f64>,
@@ -76,6 +76,16 @@ impl Judge {
         Judge { usual, radiance }
     }
 
+    /// Of several tiles, one after the other.
+    fn of_all(tiles: &[&mut Tile]) -> Self {
+        let mut all = Judge { usual: Vec::new(), radiance: Vec::new() };
+        for mut judge in tiles.iter().map(|tile| Judge::new(tile)) {
+            all.usual.append(&mut judge.usual);
+            all.radiance.append(&mut judge.radiance);
+        }
+        all
+    }
+
     /// Largest value of a trial of a pixel, mean over bands, that stays with it.
     fn limit(&self, i: usize, trials: u32) -> f64 {
         (SEEN * f64::from(trials) * self.radiance[i]).max(RARE * self.usual[i])
@@ -96,12 +106,12 @@ impl Judge {
     }
 }
 
-/// Shares what the brightest trials of a tile's pixels bring above the usual.
-pub fn share(tile: &mut Tile) {
-    let judge = Judge::new(tile);
-    let mut shared = [Radiance::default(); (TILE * TILE) as usize];
-    for i in 0..tile.pixels.len() {
-        let Pixel { lores, brightest, .. } = &mut tile.pixels[i];
+/// Shares what the brightest trials of the pixels of some tiles bring above the usual among all of them.
+pub fn share(tiles: &mut [&mut Tile]) {
+    let judge = Judge::of_all(tiles);
+    let mut shared = vec![Radiance::default(); judge.usual.len()];
+    for (i, pixel) in tiles.iter_mut().flat_map(|tile| &mut tile.pixels).enumerate() {
+        let Pixel { lores, brightest, .. } = pixel;
         let trials = f64::from(lores.trials());
         let limit = judge.limit(i, lores.trials());
         let mut given = Radiance::default();
@@ -122,7 +132,7 @@ pub fn share(tile: &mut Tile) {
             to.add_share(&given, share);
         }
     }
-    for (pixel, light) in tile.pixels.iter_mut().zip(&shared) {
+    for (pixel, light) in tiles.iter_mut().flat_map(|tile| &mut tile.pixels).zip(&shared) {
         pixel.lores.raise(light.all, light.even);
     }
 }
@@ -190,7 +200,7 @@ mod tests {
         let bright = Vec3::new(200.0, 100.0, 50.0);
         let before = tile(|_| 1.0, bright);
         let mut after = before.clone();
-        share(&mut after);
+        share(&mut [&mut after]);
         for of in [PixelSum::mean, even] {
             let (before, after) = (sum(&before, of), sum(&after, of));
             assert!((after / before - 1.0).abs() < 1e-6, "{before} {after}");
@@ -209,7 +219,7 @@ mod tests {
     fn usual_trials_stay_bit_for_bit() {
         let before = tile(|i| 1.0 + 0.02 * i as f32, Vec3::ONE);
         let mut after = before.clone();
-        share(&mut after);
+        share(&mut [&mut after]);
         for (before, after) in before.pixels.iter().zip(&after.pixels) {
             assert_eq!((before.lores.mean(), before.lores.variance()), (after.lores.mean(), after.lores.variance()));
         }
@@ -225,7 +235,7 @@ mod tests {
         };
         let mut shared = tile(level, Vec3::splat(100.0));
         let before = shared.clone();
-        share(&mut shared);
+        share(&mut [&mut shared]);
         let more = |i: usize| shared.pixels[i].lores.mean()[0] - before.pixels[i].lores.mean()[0];
         assert!(more(0) > 0.05 && more(5) < 1e-3 * more(0) && more(7) == 0.0, "{} {} {}", more(0), more(5), more(7));
     }
@@ -234,7 +244,7 @@ mod tests {
     fn light_that_only_one_pixel_sees_stays() {
         let before = tile(|_| 0.0, Vec3::ONE);
         let mut after = before.clone();
-        share(&mut after);
+        share(&mut [&mut after]);
         for i in [0, 27, 36] {
             let [before, after] = [&before, &after].map(|tile| tile.pixels[i].lores.mean()[0]);
             assert!((after - before).abs() <= 1e-12 * before);
