@@ -98,82 +98,6 @@ void load(RTCRay* out, const gsii_embree_ray* ray, unsigned int mask) {
     out->flags = 0;
 }
 
-/* Difference of a distance from the true one that is left alone, as a share of the distance to the triangle's corners. */
-const double ROUNDING = 0x1p-20;
-/* How often a ray goes on behind a hit that is not where Embree says. */
-const int MOST_RETRIES = 16;
-
-/* Whether the distance of a hit on the triangle is to be checked. */
-bool is_sliver(const gsii_embree_query* query, unsigned int triangle) {
-    return query->slivers[triangle / 64] >> triangle % 64 & 1;
-}
-
-struct vec {
-    double x, y, z;
-};
-
-vec operator-(vec a, vec b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-double dot(vec a, vec b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-vec cross(vec a, vec b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
-
-/* The distance of a hit worked out again in double precision, kept between those of the triangle's corners along the ray. Embree divides
- * by the product of direction and normal, which for a sliver far away may be rounding error and nothing else: the hit is then anywhere
- * on the ray (its issue 387). A distance that is right within rounding stays as it is. */
-float distance_again(const gsii_embree_query* query, const gsii_embree_ray* ray, const gsii_embree_hit* hit) {
-    const vec origin = {ray->origin[0], ray->origin[1], ray->origin[2]};
-    const vec direction = {ray->direction[0], ray->direction[1], ray->direction[2]};
-    const double speed2 = dot(direction, direction);
-    vec corners[3];
-    double low = INFINITY, high = -INFINITY, reach2 = 0.0;
-    for (int k = 0; k < 3; ++k) {
-        const float* p = query->positions + 3 * (size_t)query->triangles[3 * (size_t)hit->triangle + k];
-        corners[k] = vec{p[0], p[1], p[2]} - origin;
-        low = fmin(low, dot(corners[k], direction) / speed2);
-        high = fmax(high, dot(corners[k], direction) / speed2);
-        reach2 = fmax(reach2, dot(corners[k], corners[k]));
-    }
-    const vec normal = cross(corners[1] - corners[0], corners[2] - corners[0]);
-    const double facing = dot(normal, direction);
-    double t = facing != 0.0 ? dot(normal, corners[0]) / facing : hit->t;
-    t = t < low ? low : t > high ? high : t;
-    return fabs(t - hit->t) <= ROUNDING * sqrt(reach2 / speed2) ? hit->t : (float)t;
-}
-
-/* Puts a hit that Embree found at a wrong distance where it is, and lets the ray go on from the wrong one: what was taken to lie behind
- * it may lie before it. */
-void settle_sliver(RTCScene scene, RTCIntersectArguments* args, const gsii_embree_query* query,
-                    const gsii_embree_ray* ray, gsii_embree_hit* hit) {
-    gsii_embree_hit found = *hit;
-    float t = distance_again(query, ray, &found);
-    if (t == found.t) return;
-    gsii_embree_hit best = MISS;
-    RTCRayHit rh;
-    memset(&rh, 0, sizeof rh);
-    for (int retry = 0;; ++retry) {
-        const bool further = t > found.t || t < ray->t_near;
-        const float behind = nextafterf(found.t, INFINITY);
-        if (t >= positive(ray->t_near) && t <= ray->t_far && t < best.t) {
-            best = found;
-            best.t = t;
-        }
-        const float end = best.t < ray->t_far ? best.t : ray->t_far;
-        if (!further || behind > end || retry == MOST_RETRIES) break;
-        load(&rh.ray, ray, query->mask);
-        rh.ray.tnear = positive(behind);
-        rh.ray.tfar = end;
-        rh.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-        rtcIntersect1(scene, &rh, args);
-        if (rh.hit.geomID == RTC_INVALID_GEOMETRY_ID) break;
-        found = {within(rh.ray.tfar, ray), rh.hit.u, rh.hit.v, query->parts[rh.hit.geomID].first_triangle + rh.hit.primID};
-        t = is_sliver(query, found.triangle) ? distance_again(query, ray, &found) : found.t;
-        if (t == found.t) {
-            if (t < best.t) best = found;
-            break;
-        }
-    }
-    *hit = best;
-}
-
 void closest_one_by_one(RTCScene scene, RTCIntersectArguments* args, const gsii_embree_query* query,
                                const gsii_embree_ray* rays, gsii_embree_hit* hits, size_t n) {
     RTCRayHit rh;
@@ -193,7 +117,6 @@ void closest_one_by_one(RTCScene scene, RTCIntersectArguments* args, const gsii_
             hits[i].u = rh.hit.u;
             hits[i].v = rh.hit.v;
             hits[i].triangle = query->parts[rh.hit.geomID].first_triangle + rh.hit.primID;
-            if (is_sliver(query, hits[i].triangle)) settle_sliver(scene, args, query, &rays[i], &hits[i]);
         }
     }
 }
@@ -252,9 +175,6 @@ void closest_packets(RTCScene scene, RTCIntersectArguments* args, const gsii_emb
                 hits[i + k].u = rh.hit.u[k];
                 hits[i + k].v = rh.hit.v[k];
                 hits[i + k].triangle = query->parts[rh.hit.geomID[k]].first_triangle + rh.hit.primID[k];
-                if (is_sliver(query, hits[i + k].triangle)) {
-                    settle_sliver(scene, args, query, &rays[i + k], &hits[i + k]);
-                }
             }
         }
     }

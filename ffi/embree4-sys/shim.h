@@ -42,9 +42,6 @@ typedef bool (*gsii_embree_filter)(void* user, unsigned int triangle, float u, f
 struct gsii_embree_query {
     RTCScene scene;                      /* committed */
     const struct gsii_embree_part* parts; /* by geomID */
-    const float* positions;              /* three for each vertex */
-    const unsigned int* triangles;       /* three vertices for each triangle of the whole set */
-    const unsigned long long* slivers;   /* a bit for each triangle, least significant first: whether its hits' distances are checked */
     unsigned int mask;                   /* geometries with a bit of this in their mask are seen */
     bool coherent;                       /* neighbouring rays start close together and run nearly parallel */
     bool packets;                        /* whether the device has packets of GSII_EMBREE_PACKET rays natively */

@@ -12,7 +12,6 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use embree4_sys as sys;
 use glam::Vec3;
-use rayon::prelude::*;
 
 use super::{Coherence, Hit, HitFilter, PartKind, Ray, RayBackend, RayScene, TriangleSet, Visible};
 use crate::error::{Error, Result};
@@ -294,39 +293,10 @@ impl RayBackend for EmbreeBackend {
     }
 }
 
-/// Triangles whose least height is below this share of the scene's diagonal are slivers. Embree's distance to a triangle is off by its
-/// own length of rounding, some ten times 2^-24 of the ray's length divided by height and cosine: here 1 % of it, over the cosine. They are
-/// about 1 % of the area of detailed interiors.
-const SLIVER: f64 = 1.0 / 4096.0;
-
-/// A bit for each triangle, least significant first: whether Embree's distance to it may be off by more than its own size.
-fn slivers(set: &TriangleSet<'_>) -> Vec<u64> {
-    let corners = |triangle: &[u32; 3]| triangle.map(|vertex| set.positions[vertex as usize]);
-    let empty = || [Vec3::INFINITY, Vec3::NEG_INFINITY];
-    let [low, high] = set
-        .triangles
-        .par_iter()
-        .flat_map_iter(corners)
-        .fold(empty, |[low, high], p| [low.min(p), high.max(p)])
-        .reduce(empty, |a, b| [a[0].min(b[0]), a[1].max(b[1])]);
-    let height = SLIVER * (high.as_dvec3() - low.as_dvec3()).length();
-    let is_sliver = |triangle: &[u32; 3]| {
-        let [a, b, c] = corners(triangle).map(|corner| corner.as_dvec3());
-        let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared()).sqrt();
-        (b - a).cross(c - a).length() <= height * longest
-    };
-    let word = |triangles: &[[u32; 3]]| triangles.iter().rev().fold(0, |bits, t| bits << 1 | u64::from(is_sliver(t)));
-    set.triangles.par_chunks(64).map(word).collect()
-}
-
 /// A committed scene: read-only from here on.
 struct EmbreeScene {
     // In this order: Embree counts references, but the device's callbacks need its monitor to the very last.
     scene: Scene,
-    /// Vertices and triangles as the scene holds them, unless it is empty.
-    buffers: Option<[Buffer; 2]>,
-    /// See [`slivers`].
-    slivers: Vec<u64>,
     device: Device,
     parts: Vec<sys::gsii_embree_part>,
     /// Whether any hit must be put to the shim's filter.
@@ -366,7 +336,6 @@ impl EmbreeScene {
             sys::rtcSetSceneFlags(scene.0, flags);
             sys::rtcSetSceneBuildQuality(scene.0, sys::RTCBuildQuality::RTC_BUILD_QUALITY_HIGH);
         }
-        let mut buffers = None;
         if !set.triangles.is_empty() {
             let positions = Buffer::copy_of(&device, set.positions)?;
             let triangles = Buffer::copy_of(&device, set.triangles)?;
@@ -414,7 +383,6 @@ impl EmbreeScene {
                 }
                 device.check()?;
             }
-            buffers = Some([positions, triangles]);
         }
         // SAFETY: the scene is alive; its geometries are committed.
         unsafe { sys::rtcCommitScene(scene.0) };
@@ -426,32 +394,15 @@ impl EmbreeScene {
             .map(|(part, kind)| sys::gsii_embree_part { first_triangle: part.triangles.start, kind: kind.0 })
             .collect();
         let packets = device.property(sys::RTCDeviceProperty::RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) != 0;
-        Ok(EmbreeScene {
-            scene,
-            buffers,
-            slivers: slivers(set),
-            device,
-            parts,
-            filters,
-            filter: set.filter.clone(),
-            packets,
-        })
+        Ok(EmbreeScene { scene, device, parts, filters, filter: set.filter.clone(), packets })
     }
 
     /// Calls `trace` with what the shim needs to know, and goes on with a panic of the filter, if there was one.
     fn query(&self, visible: Visible, coherence: Coherence, trace: impl FnOnce(&sys::gsii_embree_query)) {
         let call = self.filter.as_deref().map(|filter| FilterCall { filter, panic: OnceCell::new() });
-        let data = |which: usize| {
-            let buffers = self.buffers.as_ref();
-            // SAFETY: the buffers were made when the scene was, and live as long.
-            buffers.map_or(ptr::null_mut(), |buffers| unsafe { sys::rtcGetBufferData(buffers[which].0) })
-        };
         let query = sys::gsii_embree_query {
             scene: self.scene.0,
             parts: self.parts.as_ptr(),
-            positions: data(0).cast(),
-            triangles: data(1).cast(),
-            slivers: self.slivers.as_ptr(),
             mask: match visible {
                 Visible::All => MASK_SOLID | MASK_PANE,
                 Visible::WithoutPanes => MASK_SOLID,
