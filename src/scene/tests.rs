@@ -155,6 +155,24 @@ fn impossible_materials_are_refused_by_name() {
 }
 
 #[test]
+fn impossible_lights_are_refused_by_name() {
+    let point = LightKind::Point { position: Vec3::ZERO };
+    let nowhere = LightKind::Point { position: Vec3::NAN };
+    let spot =
+        |cos_inner, cos_outer| LightKind::Spot { position: Vec3::ZERO, direction: Vec3::NEG_Z, cos_inner, cos_outer };
+    let bad = [f32::NAN, f32::INFINITY, -1.0].map(|x| (Vec3::new(1.0, x, 1.0), point));
+    let kinds = [nowhere, spot(0.5, 0.9), spot(1.0, -0.5), spot(f32::NAN, 0.5), spot(1.0, f32::NAN)];
+    for (intensity, kind) in bad.into_iter().chain(kinds.map(|kind| (Vec3::ONE, kind))) {
+        let mut builder = SceneBuilder::new("test");
+        let material = builder.add_material(grey());
+        builder.add_mesh("square", square(), material, at(0.0, 0.0, 0.0)).unwrap();
+        builder.add_light(PunctualLight { name: "lamp".into(), intensity, kind }, at(0.0, 0.0, 1.0));
+        let error = builder.finish().expect_err(&format!("{intensity} {kind:?}")).to_string();
+        assert!(error.contains("'lamp'"), "{error}");
+    }
+}
+
+#[test]
 fn broken_parts_are_refused() {
     let mut builder = SceneBuilder::new("test");
     let material = builder.add_material(grey());

@@ -20,16 +20,28 @@ fn agree(whole: &Film, part: &Film, region: Region) {
     }
 }
 
+/// Trials that follow the error of the whole image, as `--error 0.1` asks for: a pixel's own is left alone up to four times that.
+fn shared_out(width: u32, height: u32, least: u32, most: u32) -> RenderParams {
+    RenderParams { max_trials: most, error: 0.1, hires_error: 0.4, lores_error: 0.4, ..fixed(width, height, least, 3) }
+}
+
+/// Trials are shared out unevenly, and not as they would be by each pixel's own error.
+fn follows_the_error(film: &Film, by_pixel: &Film) {
+    let trials = |film: &Film| -> Vec<u32> { film.pixels().map(|p| p.lores.trials()).collect() };
+    let (all, alone) = (trials(film), trials(by_pixel));
+    let range = |all: &[u32]| (all.iter().min().copied(), all.iter().max().copied(), all.iter().sum::<u32>());
+    let ranges = (range(&all), range(&alone));
+    assert!(ranges.0.0 < ranges.0.1 && all != alone, "{ranges:?}");
+}
+
 #[test]
 fn crops_have_the_bits_of_the_whole() {
     let room = scene(&lit_room());
     for method in [Method::Gsii, Method::Mcpt] {
         let (prepared, _) = prepare(&room, Settings { method, ..Settings::default() });
-        let params =
-            RenderParams { max_trials: 256, hires_error: 0.1, lores_error: 0.1, features: true, ..fixed(45, 30, 4, 3) };
+        let params = RenderParams { features: true, ..shared_out(45, 30, 4, 256) };
         let whole = render(&prepared, &params).film;
-        let trials: Vec<u32> = whole.pixels().map(|p| p.lores.trials()).collect();
-        assert!(trials.iter().min() < trials.iter().max(), "trials are shared out unevenly");
+        follows_the_error(&whole, &render(&prepared, &RenderParams { error: f32::INFINITY, ..params.clone() }).film);
         for (low, high) in [([0, 0], [45, 30]), ([5, 3], [30, 29]), ([44, 29], [45, 30])] {
             let region = Region { low, high };
             let part = render(&prepared, &RenderParams { region: Some(region), ..params.clone() }).film;
@@ -42,8 +54,9 @@ fn crops_have_the_bits_of_the_whole() {
 #[test]
 fn crops_of_large_images_have_the_bits_of_the_whole() {
     let (prepared, _) = prepare(&scene(&lit_room()), Settings { method: Method::Mcpt, ..Settings::default() });
-    let params = RenderParams { max_trials: 16, ..fixed(528, 264, 2, 4) };
+    let params = shared_out(528, 264, 2, 32);
     let whole = render(&prepared, &params).film;
+    follows_the_error(&whole, &render(&prepared, &RenderParams { error: f32::INFINITY, ..params.clone() }).film);
     for (low, high) in [([100, 50], [131, 70]), ([520, 255], [528, 264])] {
         let region = Region { low, high };
         agree(&whole, &render(&prepared, &RenderParams { region: Some(region), ..params.clone() }).film, region);

@@ -168,3 +168,131 @@ impl Nearby {
         number
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec2;
+
+    use super::*;
+    use crate::sampling::{hash_all, uniform_sphere, unit};
+
+    /// Half a unit in the last place.
+    const U: f32 = f32::EPSILON / 2.0;
+
+    fn random(key: [u32; 3]) -> f32 {
+        unit(hash_all(&key))
+    }
+
+    fn vector(seed: u32, what: u32) -> Vec3 {
+        Vec3::from_array([0, 1, 2].map(|axis| 2.0 * random([seed, what, axis]) - 1.0))
+    }
+
+    fn record(seed: u32) -> Record {
+        Record {
+            position: vector(seed, 0),
+            normal: tilted(seed, 1),
+            distance: 1.0,
+            reach: 0.2 + 3.0 * random([seed, 2, 0]),
+            least_reach: 0.1,
+            refuses: random([seed, 2, 1]) < 0.2,
+            radiance: vector(seed, 3).abs(),
+            by_rotation: [4, 5, 6].map(|what| vector(seed, what)),
+            by_translation: [7, 8, 9].map(|what| vector(seed, what)),
+        }
+    }
+
+    /// A direction within some 17 degrees of the third axis, so that most pairs are close enough to be interpolated.
+    fn tilted(seed: u32, what: u32) -> Vec3 {
+        let around = uniform_sphere(Vec2::new(random([seed, what, 0]), random([seed, what, 1])));
+        (Vec3::Z + 0.3 * random([seed, what, 2]) * around).normalize()
+    }
+
+    /// Bound of the difference of two ways to round a record's weight; infinite where rounding decides whether it counts at all.
+    fn weight_off(record: &Record, position: Vec3, normal: Vec3) -> f32 {
+        let offset = position - record.position;
+        let both = normal + record.normal;
+        let front = offset.dot(both) + 2.0 * IN_FRONT * record.reach;
+        // Five roundings in each product of the sum, on both sides
+        if front.abs() <= 10.0 * U * (offset.abs().dot(both.abs()) + record.reach) {
+            return f32::INFINITY;
+        }
+        let moved = offset.length_squared() / (record.reach * record.reach);
+        let turned = (1.0 - normal.dot(record.normal)) / (1.0 - LEAST_COSINE);
+        // Products of unit vectors: three roundings each, on both sides, and the one of the difference
+        let off = (12.0 * U * moved).max((7.0 * U) / (1.0 - LEAST_COSINE));
+        // |sqrt a - sqrt b| = |a - b| / (sqrt a + sqrt b), at most sqrt |a - b|
+        off / moved.max(turned).max(off).sqrt() + 4.0 * U
+    }
+
+    /// Bound of the difference of two ways to round what a record says.
+    fn value_off(record: &Record, position: Vec3, normal: Vec3) -> Vec3 {
+        let (axis, offset) = (record.normal.cross(normal).abs(), (position - record.position).abs());
+        // The cross product's own roundings come from factors of at most one.
+        let change = |band: usize| {
+            axis.dot(record.by_rotation[band].abs())
+                + offset.dot(record.by_translation[band].abs())
+                + record.by_rotation[band].abs().element_sum()
+        };
+        16.0 * U * (Vec3::new(change(0), change(1), change(2)) + record.radiance)
+    }
+
+    /// What is worked out eight abreast is what each record says by itself, to rounding.
+    #[test]
+    fn lists_say_what_their_records_say() {
+        let (mut counted, mut unclear, mut silent) = (0, 0, 0);
+        for seed in 0..20_000 {
+            let records: Vec<Record> = (0..1 + seed % 19).map(|k| record(hash_all(&[seed, k]))).collect();
+            let mut list = List::default();
+            records.iter().for_each(|record| list.push(record));
+            let (position, normal) = (vector(seed, 10), tilted(seed, 11));
+
+            let lanes: Vec<f32> = list.blocks.iter().flat_map(|block| block.weights(position, normal)).collect();
+            assert!(lanes[records.len()..].iter().all(|weight| *weight == 0.0));
+            let weights: Vec<f32> = records.iter().map(|record| record.weight(position, normal)).collect();
+            let off: Vec<f32> = records.iter().map(|record| weight_off(record, position, normal)).collect();
+            if off.contains(&f32::INFINITY) {
+                unclear += 1;
+                continue;
+            }
+            for ((lane, weight), off) in lanes.iter().zip(&weights).zip(&off) {
+                assert!((lane - weight).abs() <= *off, "{seed}: {lane} {weight} {off}");
+            }
+            if lanes.iter().chain(&weights).all(|weight| *weight == 0.0) {
+                assert!(list.look_up(position, normal).is_none());
+                silent += 1;
+                continue;
+            }
+
+            let sum_of = |which: bool| -> f32 {
+                records.iter().zip(&weights).filter(|(r, _)| r.refuses == which).map(|(_, weight)| weight).sum()
+            };
+            let (speak, refuse) = (sum_of(false), sum_of(true));
+            let all_off: f32 = off.iter().sum::<f32>() + 40.0 * U * (speak + refuse);
+            if (speak - refuse).abs() <= all_off {
+                unclear += 1;
+                continue;
+            }
+            let found = list.look_up(position, normal);
+            assert_eq!(found.is_some(), speak > refuse, "{seed}");
+            let Some(found) = found else {
+                silent += 1;
+                continue;
+            };
+            let speaking = || records.iter().zip(&weights).zip(&off).filter(|((record, _), _)| !record.refuses);
+            let sum: Vec3 = speaking().map(|((record, weight), _)| *weight * record.at(position, normal)).sum();
+            let expected = sum / speak;
+            let off: Vec3 = speaking()
+                .map(|((record, weight), off)| {
+                    let value = record.at(position, normal);
+                    off * (value - expected).abs()
+                        + (weight + off) * (value_off(record, position, normal) + 40.0 * U * value)
+                })
+                .sum();
+            // The divisor is off as well.
+            let off = off / (speak - all_off);
+            assert!((found - expected).abs().cmple(off).all(), "{seed}: {found} {expected} {off}");
+            counted += 1;
+        }
+        assert!(counted > 5000 && silent > 500 && unclear < 200, "{counted} {silent} {unclear}");
+    }
+}

@@ -88,6 +88,34 @@ fn cameras_inside_of_clutter() {
 }
 
 #[test]
+fn small_lamps_in_clutter_keep_their_light() {
+    // D11: a lamp of a ten-thousandth below a pile of black blocks that is one equivalent box, in a black room. Lamp and distance are binary
+    // fractions.
+    let mut model = closed_box(DVec3::ONE, [0.0; 6], [0.0; 6]);
+    let blocks = (0..1000).flat_map(|k| {
+        let at = 0.4 + 0.02 * v(f64::from(k % 10), f64::from(k / 10 % 10), f64::from(k / 100));
+        solid(at, at + 0.01)
+    });
+    model.add("clutter", blocks.collect(), grey(0.0));
+    let (half, height, floor) = (2_f64.powi(-14), 0.375, 2_f64.powi(-7));
+    let exitance = 1e6;
+    model.add("lamp", level([0.5 - half, 0.5 + half], [0.5 - half, 0.5 + half], height, false), glow(0.0, exitance));
+    let point = v(0.5, 0.5, floor);
+    receiver(&mut model, point, DVec3::Z, 1e-2);
+    let scene = model.finish();
+    let settings = Settings { r_thresh: Some(0.2), patch_size: Some(0.25), ..Settings::default() };
+    let simplified = prepare(&scene, settings.clone()).unwrap().far.unwrap().simplified.unwrap();
+    assert!(simplified.clusters.iter().any(|cluster| cluster.surfaces.len() >= 500), "a pile in one box");
+    let size = 1e-4;
+    let camera = [look_at(&scene, point, DVec3::Z, 0.1, size)];
+    let seen = irradiance(radiance_of(&scene, &settings, &camera, [4, 4], 64, Part::All)[0]);
+    let expected = exitance / PI * (2.0 * half).powi(2) / (height - floor).powi(2);
+    // A lamp and a view of some width: a second of their squares' share of the distance; and sums in f32.
+    let allowed = (2.0 * (half * half + size * size) / (height - floor).powi(2) + 1e-5) * expected;
+    assert!((seen.mean - expected).abs() <= SIGMA * seen.error + allowed, "{seen:?}, not {expected}");
+}
+
+#[test]
 fn clutter_through_a_wall_carries_no_light_through_it() {
     // D7.
     let scene = rods_through_a_wall().finish();

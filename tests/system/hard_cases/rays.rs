@@ -63,6 +63,51 @@ fn reintersect() {
     assert_eq!((rays_traced, own), (1_000_000, [0, 0]));
 }
 
+/// C6: rays in the plane of a quad miss it, from wherever and wherever to, and meet what is behind it.
+#[test]
+fn rays_in_the_plane_of_a_face() {
+    let backends: [(&str, &dyn RayBackend); 2] = [("Embree", &embree()), ("obvhs", &ObvhsBackend)];
+    let quad = |x: [f32; 2], y: [f32; 2], z: [f32; 2]| {
+        let skew = if x[0] == x[1] { [y[0], y[1], y[1], y[0]] } else { [y[0]; 4] };
+        [
+            Vec3::new(x[0], skew[0], z[0]),
+            Vec3::new(x[1], skew[1], z[0]),
+            Vec3::new(x[1], skew[2], z[1]),
+            Vec3::new(x[0], skew[3], z[1]),
+        ]
+    };
+    // The quad on edge, and one that is met square on.
+    let positions = [quad([0.3; 2], [0.1, 0.9], [0.1, 0.9]), quad([-9.0, 9.0], [2.0; 2], [-9.0, 9.0])].concat();
+    let triangles = [[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]];
+    let parts = [TrianglePart { triangles: 0..4, kind: PartKind::Opaque }];
+    let set = TriangleSet { positions: &positions, triangles: &triangles, parts: &parts, filter: None };
+    let rays: Vec<Ray> = (0..10_000)
+        .map(|k| {
+            let random = |what: u32| unit(hash_all(&[what, k]));
+            let origin = Vec3::new(0.3, -random(1), random(2));
+            Ray::new(origin, Vec3::new(0.0, 1.0, random(3) - 0.5).normalize())
+        })
+        .collect();
+    for (name, backend) in backends {
+        let scene = backend.build(&set).unwrap();
+        for coherence in [Coherence::Coherent, Coherence::Incoherent] {
+            let (mut hits, mut occluded) = (vec![Hit::MISS; rays.len()], vec![true; rays.len()]);
+            scene.closest(&rays, Visible::All, coherence, &mut hits);
+            for (ray, hit) in rays.iter().zip(&hits) {
+                let along = (2.0 - f64::from(ray.origin.y)) / f64::from(ray.direction.y);
+                // What the two libraries' own comparison allows here: a few roundings of coordinates up to 18.
+                assert!(
+                    hit.triangle >= 2 && (f64::from(hit.t) - along).abs() < 64.0 * 2_f64.powi(-24) * 18.0,
+                    "{name}: {hit:?}"
+                );
+            }
+            let short: Vec<Ray> = rays.iter().map(|ray| Ray { t_far: 1.95, ..*ray }).collect();
+            scene.occluded(&short, Visible::All, coherence, &mut occluded);
+            assert!(!occluded.contains(&true), "{name}");
+        }
+    }
+}
+
 /// Embree's distance to a sliver that is met at half a degree can be far beyond its corners (Embree issue 387). Points come from
 /// barycentric coordinates, so this only decides between near and far, and what lies in front of what: it must stay rare, and obvhs must not
 /// do it at all.
