@@ -10,11 +10,11 @@
 //!   bound of the mean absolute difference;
 //! * `mean d`: the difference of the means;
 //!
-//! for boxes fitted both ways and for clusters that are just dropped. `--by-surface` says where the flux boxes' mean difference
-//! comes from: by what a ray meets in N+C and what it meets in N+S.
+//! for boxes fitted both ways and for clusters that are just dropped. `--by-surface` says where the flux boxes' difference
+//! comes from: by what a ray meets in N+C and what it meets in N+S, and by cluster those that have most part in `rms d`.
 //!
-//! `cargo run --release --example far_field -- [--r-thresh X] [--beta X] [--patch-size X] [--longest X] [--points N] [--rays N]
-//! [--error X] [--by-surface] [--only flux] SCENE...`
+//! `cargo run --release --example far_field -- [--r-thresh X] [--beta X] [--patch-size X] [--longest X] [--face-resolution N]
+//! [--points N] [--rays N] [--error X] [--by-surface] [--only flux] SCENE...`
 
 use std::path::Path;
 use std::sync::Arc;
@@ -55,6 +55,7 @@ fn main() -> Outcome<()> {
             "--beta" => options.settings.beta = value()?.parse()?,
             "--patch-size" => options.settings.patch_size = Some(value()?.parse()?),
             "--longest" => options.settings.longest_cluster = value()?.parse()?,
+            "--face-resolution" => options.settings.face_resolution = value()?.parse()?,
             "--error" => options.settings.radiosity_error = value()?.parse()?,
             "--points" => options.points = value()?.parse()?,
             "--rays" => options.rays = value()?.parse()?,
@@ -64,8 +65,8 @@ fn main() -> Outcome<()> {
         }
     }
     println!(
-        "{:<18} {:>8} {:>7} {:>6} {:>8}  {:<9} {:>8} {:>7} {:>7} {:>8}",
-        "scene", "r_thresh", "beta", "boxes", "surfaces", "clusters", "mean |d|", "noise", "rms d", "mean d"
+        "{:<18} {:>8} {:>7} {:>6} {:>8} {:>8}  {:<9} {:>8} {:>7} {:>7} {:>8}",
+        "scene", "r_thresh", "beta", "boxes", "surfaces", "patches", "clusters", "mean |d|", "noise", "rms d", "mean d"
     );
     for scene in scenes {
         if let Err(error) = measure(Path::new(&scene), &options) {
@@ -160,19 +161,22 @@ fn measure(path: &Path, options: &Options) -> Outcome<()> {
         let Some(expected) = &reference else { continue };
         let e = Errors::new(expected, &found, options.rays as usize);
         println!(
-            "{:<18} {:>8.4} {:>7.4} {:>6} {:>8}  {name:<9} {:>7.2}% {:>6.2}% {:>6.2}% {:>+7.2}%",
+            "{:<18} {:>8.4} {:>7.4} {:>6} {:>8} {:>8}  {name:<9} {:>7.2}% {:>6.2}% {:>6.2}% {:>+7.2}%",
             path.file_stem().unwrap_or_default().to_string_lossy(),
             settings.r_thresh(),
             settings.beta,
             s.clusters.len(),
             simple.geometry.surfaces,
+            simple.solutions[0].patches,
             100.0 * e.absolute,
             100.0 * e.noise,
             100.0 * e.rms,
             100.0 * e.mean
         );
         if options.by_surface && name == "flux" {
-            by_surface(&s, expected, &found);
+            let parts = Parts::new(&s, expected, &found, options.rays as usize);
+            parts.by_surface();
+            parts.by_cluster(&s);
         }
     }
     Ok(())
@@ -205,40 +209,147 @@ impl Errors {
     }
 }
 
-/// Where the mean difference comes from.
-fn by_surface(s: &Simplified, expected: &[Vec<Met>; HALVES], found: &[Vec<Met>; HALVES]) {
-    const KINDS: [&str; 5] = ["normal", "clustered", "dropped", "box", "nothing"];
-    let kind = |met: &Met| match met.source {
-        None => 4,
-        Some(TriangleSource::BoxFace { .. }) => 3,
-        Some(TriangleSource::Scene { triangle }) => {
-            match s.surfaces[s.surface_of_triangle[triangle as usize] as usize].class {
-                Class::Normal => 0,
-                Class::Complex { cluster: Some(_) } => 1,
-                Class::Complex { cluster: None } => 2,
+/// What a ray meets, and the cluster that it is part of.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Kind {
+    Normal,
+    Clustered(u32),
+    Dropped,
+    Box(u32),
+    Nothing,
+}
+
+impl Kind {
+    const NAMES: [&str; 5] = ["normal", "clustered", "dropped", "box", "nothing"];
+
+    fn of(met: &Met, s: &Simplified) -> Self {
+        match met.source {
+            None => Kind::Nothing,
+            Some(TriangleSource::BoxFace { cluster, .. }) => Kind::Box(cluster),
+            Some(TriangleSource::Scene { triangle }) => {
+                match s.surfaces[s.surface_of_triangle[triangle as usize] as usize].class {
+                    Class::Normal => Kind::Normal,
+                    Class::Complex { cluster: Some(cluster) } => Kind::Clustered(cluster),
+                    Class::Complex { cluster: None } => Kind::Dropped,
+                }
             }
         }
-    };
-    let mut table = [[(0_u64, 0.0, 0.0); 5]; 5];
-    let (mut all, mut sum) = (0_u64, 0.0);
-    for (e, f) in expected.iter().flatten().zip(found.iter().flatten()) {
-        let cell = &mut table[kind(e)][kind(f)];
-        cell.0 += 1;
-        cell.1 += e.radiosity;
-        cell.2 += f.radiosity - e.radiosity;
-        all += 1;
-        sum += e.radiosity;
     }
-    println!("  N+C meets  N+S meets     rays   of light     mean d");
-    for (row, of) in table.iter().zip(KINDS) {
-        for (&(rays, light, d), becomes) in row.iter().zip(KINDS).filter(|(cell, _)| cell.0 > 0) {
-            let percent = |x: f64| 100.0 * x / sum;
-            println!(
-                "  {of:<10} {becomes:<10} {:>6.2}%   {:>7.2}%   {:>+7.2}%",
-                100.0 * rays as f64 / all as f64,
-                percent(light),
-                percent(d)
+
+    fn index(self) -> usize {
+        match self {
+            Kind::Normal => 0,
+            Kind::Clustered(_) => 1,
+            Kind::Dropped => 2,
+            Kind::Box(_) => 3,
+            Kind::Nothing => 4,
+        }
+    }
+
+    fn cluster(self) -> Option<u32> {
+        match self {
+            Kind::Clustered(cluster) | Kind::Box(cluster) => Some(cluster),
+            _ => None,
+        }
+    }
+}
+
+/// A part of the difference, over the mean irradiance.
+#[derive(Clone, Copy, Default)]
+struct Part {
+    rays: u64,
+    light: f64,
+    mean: f64,
+    /// Part in the square of `rms d`: mean over points of the products of this part with the other repetition's whole.
+    square: f64,
+}
+
+impl Part {
+    fn add(&mut self, other: Part) {
+        self.rays += other.rays;
+        self.light += other.light;
+        self.mean += other.mean;
+        self.square += other.square;
+    }
+
+    fn print(&self, what: &str, rays: u64) {
+        println!(
+            "  {what:<21} {:>6.2}%   {:>7.2}%   {:>+7.2}%   {:>+9.6}",
+            100.0 * self.rays as f64 / rays as f64,
+            100.0 * self.light,
+            100.0 * self.mean,
+            self.square
+        );
+    }
+}
+
+/// Where the difference comes from.
+struct Parts {
+    of_kinds: [[Part; 5]; 5],
+    /// With what the clusters' boxes hide and what shows where the clusters stood.
+    of_clusters: Vec<Part>,
+    rays: u64,
+}
+
+impl Parts {
+    fn new(s: &Simplified, expected: &[Vec<Met>; HALVES], found: &[Vec<Met>; HALVES], rays_a_point: usize) -> Self {
+        let rays = expected.iter().map(Vec::len).sum::<usize>();
+        let sum: f64 = expected.iter().flatten().map(|met| met.radiosity).sum();
+        // One ray's part in the mean over all rays of both repetitions.
+        let d = |half: usize, ray: usize| (found[half][ray].radiosity - expected[half][ray].radiosity) / sum;
+        let points = expected[0].len() / rays_a_point;
+        let of_point = |half: usize, point: usize| -> f64 {
+            (point * rays_a_point..(point + 1) * rays_a_point).map(|ray| d(half, ray)).sum::<f64>()
+                * (HALVES * points) as f64
+        };
+        let mut parts = Parts {
+            of_kinds: [[Part::default(); 5]; 5],
+            of_clusters: vec![Part::default(); s.clusters.len()],
+            rays: rays as u64,
+        };
+        for half in 0..HALVES {
+            for point in 0..points {
+                let others = of_point(1 - half, point);
+                for ray in point * rays_a_point..(point + 1) * rays_a_point {
+                    let (e, f) = (&expected[half][ray], &found[half][ray]);
+                    let (was, is) = (Kind::of(e, s), Kind::of(f, s));
+                    let d = d(half, ray);
+                    let part = Part { rays: 1, light: e.radiosity / sum, mean: d, square: d * others };
+                    parts.of_kinds[was.index()][is.index()].add(part);
+                    if let Some(cluster) = was.cluster().or(is.cluster()) {
+                        parts.of_clusters[cluster as usize].add(part);
+                    }
+                }
+            }
+        }
+        parts
+    }
+
+    fn by_surface(&self) {
+        println!("  N+C meets  N+S meets     rays   of light     mean d   of rms d^2");
+        for (row, of) in self.of_kinds.iter().zip(Kind::NAMES) {
+            for (part, becomes) in row.iter().zip(Kind::NAMES).filter(|(part, _)| part.rays > 0) {
+                part.print(&format!("{of:<10} {becomes:<10}"), self.rays);
+            }
+        }
+    }
+
+    fn by_cluster(&self, s: &Simplified) {
+        const SHOWN: usize = 12;
+        let mut order: Vec<usize> = (0..self.of_clusters.len()).collect();
+        order.sort_by(|&a, &b| self.of_clusters[b].square.total_cmp(&self.of_clusters[a].square));
+        for &i in order.iter().take(SHOWN) {
+            let (c, b) = (&s.clusters[i], &s.clusters[i].equivalent_box);
+            let what = format!(
+                "cluster {i}: {} surfaces, p {:.2}, directional {:.2}, {:.2} -> {:.2} at {:.2}",
+                c.surfaces.len(),
+                c.residual.hit_share,
+                c.residual.directional,
+                c.bounds.size(),
+                2.0 * b.half,
+                b.centre
             );
+            self.of_clusters[i].print(&what, self.rays);
         }
     }
 }

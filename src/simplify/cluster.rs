@@ -49,6 +49,8 @@ pub struct Group {
     pub area: f64,
     /// Number of triangles.
     pub triangles: u32,
+    /// Number of surfaces.
+    pub count: u32,
     /// The lowest of its surfaces.
     pub first: u32,
     content: Content,
@@ -70,6 +72,7 @@ impl Group {
             bounds: members.iter().fold(Aabb::EMPTY, |b, s| b.union(of(s).bounds)),
             area: members.iter().map(|s| of(s).area).sum(),
             triangles: members.iter().map(|s| of(s).triangles).sum(),
+            count: members.len() as u32,
             first: members.iter().copied().min().unwrap_or(u32::MAX),
             content: Content::Surfaces(members),
         }
@@ -80,6 +83,7 @@ impl Group {
             bounds: a.bounds.union(b.bounds),
             area: a.area + b.area,
             triangles: a.triangles + b.triangles,
+            count: a.count + b.count,
             first: a.first.min(b.first),
             content: Content::Pair(Box::new([a, b])),
         }

@@ -61,7 +61,7 @@ pub struct SimplifyParams {
     /// inside misses nothing of them. Longer ones (a row of books, the frame of a chair) are kept only where hardly any light
     /// that leaves their surfaces meets them again beyond `r_thresh`, which is measured.
     pub longest: f32,
-    /// Patches along each edge of a box face.
+    /// Most patches along each edge of a box face; fewer where the box would have more patches than its cluster has surfaces.
     pub face_resolution: u32,
     /// Seed of the fitting rays.
     pub seed: u32,

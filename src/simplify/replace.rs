@@ -40,6 +40,9 @@ const MOST_DIRECTIONAL: f32 = 0.25;
 /// Times that clusters are split. More than about ten pairs deep nothing is longer than `r_thresh` any more.
 const MOST_SPLITS: usize = 8;
 
+/// Faces of a box, each a surface with a patch at least.
+const BOX_FACES: u32 = 6;
+
 /// Boxes and what the user should know about them.
 #[derive(Default)]
 pub(super) struct Replaced {
@@ -130,7 +133,8 @@ impl Replacer<'_> {
                 let probe = Probe::new(scene, &stage, rays.as_ref(), i, &frames[i], params.r_thresh);
                 // The stream follows from what the cluster is, not from how many there are.
                 let stream = sampling::hash_all(&[params.seed, groups[i].first]);
-                let fitted = fit(&probe, &frames[i], contacts[i], params, most, stream, buffers);
+                let params = SimplifyParams { face_resolution: face_resolution(&groups[i], params), ..params.clone() };
+                let fitted = fit(&probe, &frames[i], contacts[i], &params, most, stream, buffers);
                 bar.inc(1);
                 fitted
             })
@@ -185,9 +189,16 @@ impl Replacer<'_> {
     }
 }
 
-/// Whether a box is simpler than what it replaces. A few quads are not worth one: they stay as they are, which is exact.
+/// Whether a box is simpler than what it replaces: fewer triangles, and no more surfaces. A few quads, or a few round things, are not
+/// worth one: they stay as they are, which is exact.
 fn worth_a_box(group: &Group) -> bool {
-    group.triangles > geometry::BOX_TRIANGLES
+    group.triangles > geometry::BOX_TRIANGLES && group.count >= BOX_FACES
+}
+
+/// Patches along each edge of a box face: as many as asked for, but no more on the whole box than the cluster has surfaces, which are
+/// mostly a patch each.
+fn face_resolution(group: &Group, params: &SimplifyParams) -> u32 {
+    (group.count / BOX_FACES).isqrt().clamp(1, params.face_resolution)
 }
 
 impl Fitted {

@@ -279,6 +279,22 @@ fn a_box_never_replaces_something_simpler() {
 }
 
 #[test]
+fn a_box_has_no_more_patches_than_its_cluster_has_surfaces() {
+    // Balls of 224 triangles each, a surface and about a patch.
+    let patches = |n: u32| {
+        let builder = (0..n).fold(room(1, 0.5), |b, k| {
+            let centre = Vec3::new(0.4 + 0.011 * (k % 5) as f32, 0.4 + 0.011 * (k / 5) as f32, 0.4);
+            b.grey(0.5, &sphere(centre, 0.005, 8))
+        });
+        let s = run(&Arc::new(builder.build()), &params(0.2, 1.5e-3));
+        assert!(s.surfaces.iter().all(|s| s.class != Class::Complex { cluster: None }), "nothing is dropped");
+        assert!(s.clusters.len() <= 1);
+        s.clusters.first().map(|c| c.equivalent_box.reflectance.iter().map(Vec::len).sum::<usize>())
+    };
+    assert_eq!([5, 6, 23, 24].map(patches), [None, Some(6), Some(6), Some(24)]);
+}
+
+#[test]
 fn clusters_that_rays_pass_through_stay_finite() {
     let side = |opacity: f32| {
         let material = Material { opacity, alpha: Alpha::Mask { cutoff: 0.5 }, ..Material::lambertian(Vec3::ONE) };
