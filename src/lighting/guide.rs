@@ -7,6 +7,7 @@
 //! variance. The map keeps the order of each number, so that stratified points stay stratified. Their weights are divided by
 //! the density: means do not change.
 
+use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 /// Cells along each of the three random numbers.
@@ -38,11 +39,15 @@ impl Guided {
     }
 }
 
+/// A map is used where it brings the mean square of samples down to this share: one that brings less adds more noise of its own, where
+/// samples differed by chance, than it takes away.
+const USEFUL: f32 = 0.75;
+
 /// What was found, and the map that follows from what was found up to some time.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LightGuide {
-    /// By cell: sums of squares of what samples brought, and numbers of samples. Empty until the first.
-    sums: Vec<f32>,
+    /// By cell: sums of squares of what samples brought, by band, and numbers of samples. Empty until the first.
+    sums: Vec<[f32; 3]>,
     counts: Vec<f32>,
     /// Cumulative probabilities: of slabs, of rows in each slab, of cells in each row. Empty while there is no map.
     cumulative: Vec<f32>,
@@ -66,7 +71,7 @@ impl LightGuide {
     pub fn draw(&mut self, u: [f32; 3]) -> Guided {
         let mapped = self.map(u);
         if self.counts.is_empty() {
-            (self.sums, self.counts) = (vec![0.0; CELLS], vec![0.0; CELLS]);
+            (self.sums, self.counts) = (vec![[0.0; 3]; CELLS], vec![0.0; CELLS]);
         }
         let [a, b, c] = mapped.u.map(place);
         let cell = (a * SIDE + b) * SIDE + c;
@@ -89,9 +94,11 @@ impl LightGuide {
     }
 
     /// A sample brought something: `value`, without the factor of [`Guided`].
-    pub fn found(&mut self, guided: &Guided, value: f32) {
+    pub fn found(&mut self, guided: &Guided, value: Vec3) {
         if let Some(cell) = guided.cell {
-            self.sums[usize::from(cell)] += value * value;
+            for (sum, value) in self.sums[usize::from(cell)].iter_mut().zip(value.to_array()) {
+                *sum += value * value;
+            }
         }
     }
 
@@ -104,16 +111,29 @@ impl LightGuide {
 
     /// From now on the map follows what was found until now.
     pub fn learn(&mut self) {
-        let total: f32 = self.sums.iter().sum();
-        let samples: f32 = self.counts.iter().sum();
-        if !(total > 0.0 && total.is_finite()) {
+        // Each band counts by its own light: the lights of all of them are needed.
+        let mut total = [0.0; 3];
+        for sums in &self.sums {
+            (0..3).for_each(|band| total[band] += sums[band]);
+        }
+        let share = |sum: f32, total: f32| if total > 0.0 { sum / total } else { 0.0 };
+        let shares = |sums: &[f32; 3]| (0..3).map(|band| share(sums[band], total[band])).sum::<f32>();
+        let squares: Vec<f32> = self.sums.iter().map(shares).collect();
+        let all: f32 = squares.iter().sum();
+        self.cumulative.clear();
+        if !(all > 0.0 && all.is_finite()) {
             return;
         }
-        let mean = total / samples;
-        let (sums, counts) = (blurred(&self.sums), blurred(&self.counts));
-        let root = |(sum, count): (&f32, &f32)| ((sum + DOUBT * mean) / (count + DOUBT)).sqrt();
-        let mut density: Vec<f32> = sums.iter().zip(&counts).map(root).collect();
+        let mean = all / self.counts.iter().sum::<f32>();
+        let (squares, counts) = (blurred(&squares), blurred(&self.counts));
+        let expected = |(square, count): (&f32, &f32)| (square + DOUBT * mean) / (count + DOUBT);
+        let squares: Vec<f32> = squares.iter().zip(&counts).map(expected).collect();
+        let mut density: Vec<f32> = squares.iter().map(|square| square.sqrt()).collect();
         let all: f32 = density.iter().sum();
+        // Mean square of a sample over the map's density, and without it; sums over cells.
+        if all * all / CELLS as f32 > USEFUL * squares.iter().sum::<f32>() {
+            return;
+        }
         for value in &mut density {
             *value = (1.0 - EVEN) * *value / all + EVEN / CELLS as f32;
         }
@@ -121,7 +141,6 @@ impl LightGuide {
             |values: &[f32], size: usize| -> Vec<f32> { values.chunks(size).map(|c| c.iter().sum()).collect() };
         let rows = sum_of(&density, SIDE);
         let slabs = sum_of(&rows, SIDE);
-        self.cumulative.clear();
         for level in [&slabs, &rows, &density] {
             for steps in level.chunks(SIDE) {
                 let sum: f32 = steps.iter().sum();
@@ -156,7 +175,7 @@ fn blurred(values: &[f32]) -> Vec<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sampling::sobol;
+    use crate::sampling::{hash_all, sobol};
 
     /// A light that is seen through a window: a part of the cube.
     fn window([a, b, c]: [f32; 3]) -> f32 {
@@ -175,7 +194,7 @@ mod tests {
         let mut guide = LightGuide::default();
         for u in points(samples, 7) {
             let guided = guide.draw(u);
-            guide.found(&guided, light(guided.u));
+            guide.found(&guided, Vec3::splat(light(guided.u)));
         }
         guide.learn();
         guide
@@ -215,6 +234,34 @@ mod tests {
         let [exact, plain] = moments(&LightGuide::default(), elsewhere);
         assert!((mean - exact).abs() < 0.01 * exact);
         assert!(variance < plain / f64::from(EVEN) * 1.1, "{variance} {plain}");
+    }
+
+    /// A weak green light beside a strong red one is needed as much, for its band.
+    #[test]
+    fn every_band_counts_by_its_own_light() {
+        let mut guide = LightGuide::default();
+        for u in points(1024, 7) {
+            let guided = guide.draw(u);
+            let [a, b, _] = guided.u;
+            let lit = (0.25..0.5).contains(&b);
+            let light = if a < 0.5 { Vec3::X * 1e3 } else { Vec3::Y * 1e-3 };
+            guide.found(&guided, if lit { light } else { Vec3::ZERO });
+        }
+        guide.learn();
+        let left = points(4096, 5).filter(|&u| guide.map(u).u[0] < 0.5).count();
+        assert!(left.abs_diff(2048) < 40, "{left}");
+        // Of 1024 without a map.
+        let lit = points(4096, 5).filter(|&u| (0.25..0.5).contains(&guide.map(u).u[1])).count();
+        assert!(lit > 1500, "{lit}");
+    }
+
+    /// What differs by chance alone is no reason for a map.
+    #[test]
+    fn chance_is_not_learnt() {
+        let coin = |u: [f32; 3]| (hash_all(&u.map(f32::to_bits)) & 1) as f32;
+        for u in points(64, 3) {
+            assert_eq!(trained(coin, 1024).map(u), Guided::plain(u));
+        }
     }
 
     #[test]

@@ -524,7 +524,7 @@ impl World<'_> {
             let radiance = s.radiance * *share;
             sum[s.trial as usize] += radiance * s.guided.factor;
             if let Some(guide) = &mut ws.guide {
-                guide.found(&s.guided, radiance.element_sum());
+                guide.found(&s.guided, radiance);
             }
             if s.gathers {
                 ws.counts.shadow_lores += 1;
