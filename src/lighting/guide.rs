@@ -41,7 +41,7 @@ impl Guided {
 
 /// A map is used where it brings the mean square of samples down to this share: one that brings less adds more noise of its own, where
 /// samples differed by chance, than it takes away.
-const USEFUL: f32 = 0.75;
+const USEFUL: f32 = 0.85;
 
 /// What was found, and the map that follows from what was found up to some time.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
