@@ -21,6 +21,10 @@ const EVEN: f32 = 0.2;
 /// What is known of a cell counts as if so many samples had found there what all cells bring on average.
 const DOUBT: f32 = 4.0;
 
+/// A map is used where it brings the mean square of samples down to this share: one that brings less adds more noise of its own, where
+/// samples differed by chance, than it takes away.
+const USEFUL: f32 = 0.85;
+
 /// Random numbers that went through a map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Guided {
@@ -38,10 +42,6 @@ impl Guided {
         Guided { u, factor: 1.0, cell: None }
     }
 }
-
-/// A map is used where it brings the mean square of samples down to this share: one that brings less adds more noise of its own, where
-/// samples differed by chance, than it takes away.
-const USEFUL: f32 = 0.85;
 
 /// What was found, and the map that follows from what was found up to some time.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -219,7 +219,7 @@ mod tests {
         let [plain, guided] = [LightGuide::default(), trained(window, 1024)].map(|guide| moments(&guide, window));
         // 0.2 * integral of 1 + b + c over 0.6..1 and 0.2..0.7.
         let exact = 0.2 * 0.4 * 0.5 * (1.0 + 0.8 + 0.45);
-        for (mean, variance) in [plain, guided].map(|[mean, variance]| (mean, variance)) {
+        for [mean, variance] in [plain, guided] {
             // Five standard errors of as many independent points.
             assert!((mean - exact).abs() < 5.0 * (variance / f64::from(1 << 18)).sqrt(), "{mean} {exact}");
         }

@@ -107,8 +107,7 @@ impl Session {
 
     /// The image as it is now.
     pub fn film(&self) -> Film {
-        let [width, height] = self.region.size();
-        Film { width, height, origin: self.region.low, tiles: self.tiles.to_vec() }.shared()
+        shown(self.region, self.tiles.to_vec())
     }
 
     /// The film and what it cost.
@@ -116,8 +115,7 @@ impl Session {
         let spent = self.spent();
         let mut tally = self.tiles.tally();
         tally += self.plan.as_ref().map_or_else(|| self.others.tally(), |plan| plan.others);
-        let [width, height] = self.region.size();
-        let film = Film { width, height, origin: self.region.low, tiles: self.tiles.into_tiles() }.shared();
+        let film = shown(self.region, self.tiles.into_tiles());
         let filling = self.filling;
         Rendering {
             film,
@@ -128,4 +126,10 @@ impl Session {
             cache,
         }
     }
+}
+
+/// The image of some tiles.
+fn shown(region: Region, tiles: Vec<Tile>) -> Film {
+    let [width, height] = region.size();
+    Film { width, height, origin: region.low, tiles }.shared()
 }
