@@ -49,9 +49,22 @@ impl Unfinished {
     /// An empty file that is to become `target`, with the same extension.
     ///
     /// # Errors
-    /// When the system refuses.
+    /// When no file can be there: no such folder, one that is not writable, something in the way.
     pub fn new(target: &Path) -> io::Result<Self> {
-        let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        match std::fs::metadata(target) {
+            // A rename would replace a device or a pipe by a file.
+            Ok(there) if !there.is_file() => {
+                return Err(io::Error::other("something that is not a regular file is there"));
+            }
+            Ok(there) if there.permissions().readonly() => {
+                return Err(io::Error::other("it exists and is write-protected"));
+            }
+            _ => (),
+        }
+        let folder = folder(target);
+        if !folder.is_dir() {
+            return Err(io::Error::other(format!("there is no folder {}", folder.display())));
+        }
         let suffix = target.extension().map(|extension| format!(".{}", extension.to_string_lossy()));
         let suffix = suffix.unwrap_or_default();
         let mut builder = tempfile::Builder::new();
@@ -59,7 +72,8 @@ impl Unfinished {
         // Temporary files are private by default; this one is to be as open as the user's umask says.
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-        let file = builder.tempfile_in(folder)?;
+        let refused = |error: io::Error| io::Error::other(format!("{} is not writable: {error}", folder.display()));
+        let file = builder.tempfile_in(folder).map_err(refused)?;
         Ok(Unfinished { _listed: Listed::new(file.path()), file })
     }
 
@@ -77,6 +91,29 @@ impl Unfinished {
     }
 }
 
+/// Where a file is.
+fn folder(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Finds out before the work whether [`write()`] can begin.
+///
+/// # Errors
+/// As [`Unfinished::new`].
+pub fn check(target: &Path) -> Result<()> {
+    Unfinished::new(target).map(drop).map_err(|error| failure(target, &error))
+}
+
+/// Whether two names are those of one file.
+pub fn same(a: &Path, b: &Path) -> bool {
+    let place = |path: &Path| Some((folder(path).canonicalize().ok()?, path.file_name()?.to_owned()));
+    place(a).is_some_and(|a| Some(a) == place(b))
+}
+
+fn failure(target: &Path, error: &io::Error) -> Error {
+    Error::Output { path: target.to_owned(), reason: error.to_string() }
+}
+
 /// Writes a file that appears under its name when it is complete.
 ///
 /// # Errors
@@ -89,5 +126,5 @@ pub fn write(target: &Path, fill: impl FnOnce(&mut BufWriter<&File>) -> io::Resu
         drop(out);
         unfinished.finish(target)
     });
-    written.map_err(|error| Error::Output { path: target.to_owned(), reason: error.to_string() })
+    written.map_err(|error| failure(target, &error))
 }

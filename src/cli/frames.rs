@@ -39,7 +39,7 @@ impl FromStr for Range {
         };
         parse()
             .filter(|r| r.first <= r.last && r.step > 0 && r.last <= 1 << 24)
-            .ok_or_else(|| "expected frames from 0 on, as in 7, 1-24 or 1-24:2".to_owned())
+            .ok_or_else(|| "expected frames from 0 on, the smaller number first, as in 7, 1-24 or 1-24:2".to_owned())
     }
 }
 

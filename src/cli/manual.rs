@@ -14,7 +14,7 @@ use crate::error::{Error, Result};
 pub struct ManOptions {
     /// Command whose page to print; without it that of gsii itself
     command: Option<String>,
-    /// Write all pages into this folder instead (gsii.1, gsii-render.1, ...)
+    /// Write all pages into this folder, made where there is none, instead (gsii.1, gsii-render.1, ...)
     #[arg(long, value_name = "FOLDER", conflicts_with = "command")]
     all: Option<PathBuf>,
 }
@@ -34,7 +34,7 @@ pub fn man(options: &ManOptions, mut command: Command) -> Result<ExitCode> {
     command.build();
     if let Some(folder) = &options.all {
         let failed = |error: std::io::Error| Error::Output { path: folder.clone(), reason: error.to_string() };
-        clap_mangen::generate_to(command, folder).map_err(failed)?;
+        std::fs::create_dir_all(folder).and_then(|()| clap_mangen::generate_to(command, folder)).map_err(failed)?;
         return Ok(ExitCode::SUCCESS);
     }
     let chosen = match &options.command {

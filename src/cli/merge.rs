@@ -6,7 +6,8 @@ use std::process::ExitCode;
 use clap::Args;
 
 use super::options::Talk;
-use super::output::{OutputOptions, names};
+use super::output::OutputOptions;
+use super::places;
 use crate::error::Result;
 use crate::image;
 
@@ -27,9 +28,9 @@ pub struct Options {
 /// # Errors
 /// Parts that are missing, overlap or do not belong together; images that cannot be written.
 pub fn run(options: &Options) -> Result<ExitCode> {
-    OutputOptions::check(&options.output.output)?;
+    places::check(&options.output.output, [])?;
     let (whole, metadata) = image::merge(&options.parts)?;
     options.output.write(&options.output.output, &whole, &metadata)?;
-    options.talk.say(format!("{}: {} parts", names(&options.output.output), options.parts.len()));
+    options.talk.say(format!("{}: {} parts", places::names(&options.output.output), options.parts.len()));
     Ok(ExitCode::SUCCESS)
 }

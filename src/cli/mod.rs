@@ -9,6 +9,7 @@ pub mod merge;
 pub mod options;
 pub mod output;
 pub mod outside;
+pub mod places;
 pub mod render;
 pub mod simplify;
 pub mod study;
@@ -17,7 +18,7 @@ pub mod validate;
 use std::ffi::OsString;
 use std::process::ExitCode;
 
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{Arg, Command as Definition, CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use crate::error::Error;
 
@@ -56,6 +57,14 @@ enum Command {
     Completions(manual::CompletionOptions),
 }
 
+/// All commands and options. A negative number after an option is its value, so that a wrong one is called wrong by the option's
+/// own rule and not taken for an unknown option.
+fn definition() -> Definition {
+    let with_negatives =
+        |arg: Arg| if arg.get_action().takes_values() { arg.allow_negative_numbers(true) } else { arg };
+    Arguments::command().mut_subcommands(|command| command.mut_args(with_negatives))
+}
+
 /// Runs the process's command line and returns its exit code.
 pub fn run() -> ExitCode {
     run_with(std::env::args_os())
@@ -63,7 +72,8 @@ pub fn run() -> ExitCode {
 
 /// Runs a command line, the program's name first, and returns its exit code.
 pub fn run_with(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
-    let arguments = match Arguments::try_parse_from(arguments) {
+    let matches = definition().try_get_matches_from(arguments);
+    let arguments = match matches.and_then(|matches| Arguments::from_arg_matches(&matches)) {
         Ok(arguments) => arguments,
         Err(error) => {
             // Help and version are no errors; clap prints them to standard output.
@@ -80,8 +90,8 @@ pub fn run_with(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Command::Study(options) => study::run(options),
         Command::Validate(options) => validate::run(options),
         Command::Compare(options) => compare::run(options),
-        Command::Man(options) => manual::man(options, Arguments::command()),
-        Command::Completions(options) => manual::completions(options, Arguments::command()),
+        Command::Man(options) => manual::man(options, definition()),
+        Command::Completions(options) => manual::completions(options, definition()),
     };
     match outcome {
         Ok(code) => code,

@@ -42,14 +42,6 @@ pub struct OutputOptions {
 }
 
 impl OutputOptions {
-    /// Finds out before the work whether images can be written.
-    ///
-    /// # Errors
-    /// When one of them cannot.
-    pub fn check(paths: &[PathBuf]) -> Result<()> {
-        paths.iter().try_for_each(|path| image::check_writable(path))
-    }
-
     /// Writes an image to each of `paths`.
     ///
     /// # Errors
@@ -74,9 +66,4 @@ impl OutputOptions {
         };
         paths.iter().try_for_each(|path| image::write(path, image, metadata, &options))
     }
-}
-
-/// Files by name, for messages.
-pub fn names(paths: &[PathBuf]) -> String {
-    paths.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ")
 }

@@ -26,6 +26,11 @@ impl FromStr for Pair {
     }
 }
 
+fn date(s: &str) -> std::result::Result<DateTime<FixedOffset>, String> {
+    DateTime::parse_from_rfc3339(s)
+        .map_err(|e| format!("{e}: expected a date, a time and its distance from UTC, as in 2026-06-21T15:00:00+02:00"))
+}
+
 /// What lies around the scene.
 #[derive(Args, Debug)]
 pub struct OutsideOptions {
@@ -49,12 +54,19 @@ pub struct OutsideOptions {
     #[arg(long, value_name = "X", default_value_t = 1.0, requires = "outside", help_heading = "Light from outside")]
     environment_strength: f32,
     /// Where the sun of --sky stands: degrees above the horizon, and clockwise from north, which is -z [default: 45,180]
-    #[arg(long, value_name = "ELEVATION,AZIMUTH", requires = "sky", help_heading = "Light from outside")]
+    #[arg(
+        long,
+        value_name = "ELEVATION,AZIMUTH",
+        allow_hyphen_values = true,
+        requires = "sky",
+        help_heading = "Light from outside"
+    )]
     sun: Option<Pair>,
     /// Date and time that say where the sun stands, together with --place: 2026-06-21T15:00:00+02:00
     #[arg(
         long,
         value_name = "TIME",
+        value_parser = date,
         requires = "sky",
         requires = "place",
         conflicts_with = "sun",

@@ -11,8 +11,9 @@ use clap::Args;
 use super::frames::{self, FrameOptions};
 use super::long::{Checkpoint, LongOptions};
 use super::options::{MethodOptions, SceneOptions, Talk, load, set_threads};
-use super::output::{OutputOptions, names};
+use super::output::OutputOptions;
 use super::outside::OutsideOptions;
+use super::places;
 use crate::clock::Stopwatch;
 use crate::error::{Error, Result};
 use crate::image::Metadata;
@@ -41,6 +42,9 @@ const PIXEL_ERROR: f32 = 0.05;
 /// Pairs of paths that measure the bias when not said otherwise.
 const BIAS_SAMPLES: u32 = 1 << 15;
 
+/// Pixels that an image may have each way.
+const LARGEST: i64 = 1 << 16;
+
 /// In place of a camera's name: all of them.
 const ALL_CAMERAS: &str = "all";
 
@@ -59,7 +63,7 @@ impl FromStr for PartOf {
         let part =
             s.split_once('/').and_then(|(i, n)| Some(PartOf { number: i.parse().ok()?, parts: n.parse().ok()? }));
         part.filter(|p| (1..=p.parts).contains(&p.number) && p.parts <= 1 << 16)
-            .ok_or_else(|| "expected the number of a part and how many there are, as in 2/4".to_owned())
+            .ok_or_else(|| "expected I/N with I from 1 to N, as in 2/4 for the second of four parts".to_owned())
     }
 }
 
@@ -71,10 +75,10 @@ pub struct Options {
     #[command(flatten)]
     output: OutputOptions,
     /// Width in pixels [default: 1280, or from the height and the camera]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=LARGEST))]
     width: Option<u32>,
     /// Height in pixels [default: from the width and the camera]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=LARGEST))]
     height: Option<u32>,
     /// Render only pixels X0 to X1 - 1 across and Y0 to Y1 - 1 down, counted from the top left, as they are in the whole image
     #[arg(long, value_names = ["X0", "Y0", "X1", "Y1"], num_args = 4, conflicts_with = "tile")]
@@ -92,18 +96,18 @@ pub struct Options {
     #[arg(long, value_name = "X", help_heading = "Quality")]
     lores_error: Option<f32>,
     /// Fewest trials of a pixel in each pass
-    #[arg(long, value_name = "N", default_value_t = 4, help_heading = "Quality")]
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..), help_heading = "Quality")]
     min_trials: u32,
     /// Most trials of a pixel in each pass
-    #[arg(long, value_name = "N", default_value_t = 512, help_heading = "Quality")]
+    #[arg(long, value_name = "N", default_value_t = 512, value_parser = clap::value_parser!(u32).range(1..), help_heading = "Quality")]
     max_trials: u32,
     /// Fixed sampling: short for --min-trials N --max-trials N
-    #[arg(long, alias = "samples", value_name = "N", help_heading = "Quality", conflicts_with_all = ["min_trials", "max_trials", "error", "hires_error", "lores_error"])]
+    #[arg(long, visible_alias = "samples", value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Quality", conflicts_with_all = ["min_trials", "max_trials", "error", "hires_error", "lores_error"])]
     spp: Option<u32>,
     /// Gather indirect light for each pixel by itself, with no interpolation between places: slower, and without its error
     #[arg(long, help_heading = "Quality")]
     per_pixel: bool,
-    /// Begin no new trials after this many seconds of rendering
+    /// Begin no new trials after this many seconds of rendering; every pixel has its first ones all the same
     #[arg(long, value_name = "SECONDS", help_heading = "Quality")]
     time_limit: Option<f64>,
     /// Pairs of paths that measure the bias; 0 for none
@@ -134,11 +138,12 @@ pub struct Options {
 /// Bad options, bad input, a failing library, an image that cannot be written.
 pub fn run(options: &Options) -> Result<ExitCode> {
     let start = Stopwatch::start();
-    OutputOptions::check(&options.output.output)?;
+    places::check(&options.output.output, [options.stats.as_deref(), options.long.checkpoint()])?;
     options.long.check()?;
     set_threads(options.method.threads)?;
     let progress = options.talk.progress();
     stop_on_ctrl_c(&progress);
+    options.warn_of_parts();
 
     if let Some(range) = options.frames.range() {
         return frames::run(options, range, &progress);
@@ -156,10 +161,13 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     for warning in &stats.warnings {
         log::warn!("{warning}");
     }
+    let mut start = Some(start);
     for ((view, params), kept) in views.iter().zip(&params).zip(kept) {
-        // Times and counts of the preparation belong to every view.
-        let mut stats = stats.clone();
-        if !options.render_view(&prepared, view, params, kept.as_ref(), start, &progress, &mut stats)? {
+        // Counts of the preparation belong to every view, its time to the first.
+        let start = start.take().unwrap_or_else(Stopwatch::start);
+        let mut of_view = stats.clone();
+        stats = stats.at_no_cost();
+        if !options.render_view(&prepared, view, params, kept.as_ref(), start, &progress, &mut of_view)? {
             return Ok(ExitCode::FAILURE);
         }
         if progress.stopped() {
@@ -196,6 +204,14 @@ impl Options {
         self.layers.as_deref().unwrap_or(&Layer::ALL)
     }
 
+    /// Parts of which none can be joined.
+    fn warn_of_parts(&self) {
+        let is_exr = |path: &PathBuf| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
+        if self.tile.is_some() && !self.output.output.iter().any(is_exr) {
+            log::warn!("'gsii merge' joins EXR files only: with --tile, write one (-o PART.exr)");
+        }
+    }
+
     /// The cameras that are asked for, of those that a scene has. With several, their names are in those of the files.
     pub(super) fn views(&self, scene: &str, cameras: &[Camera]) -> Result<Vec<View>> {
         if self.scene.camera.as_deref() != Some(ALL_CAMERAS) {
@@ -218,9 +234,9 @@ impl Options {
                 name = format!("{name}{number}");
             }
             let outputs: Vec<PathBuf> = self.output.output.iter().map(|path| of_camera(path, &name)).collect();
-            OutputOptions::check(&outputs)?;
             let stats = self.stats.as_ref().map(|path| of_camera(path, &name));
             let checkpoint = self.long.checkpoint().map(|path| of_camera(path, &name));
+            places::check(&outputs, [stats.as_deref(), checkpoint.as_deref()])?;
             views.push(View { camera: camera.clone(), outputs, stats, checkpoint, frame: None });
             names.push(name);
         }
@@ -316,14 +332,16 @@ impl Options {
         let (hires_error, lores_error) = (self.hires_error.unwrap_or(worst), self.lores_error.unwrap_or(worst));
         let (min_trials, max_trials) = self.spp.map_or((self.min_trials, self.max_trials), |n| (n, n));
         let refuse = |what: &str| Err(Error::Usage(what.to_owned()));
-        if width == 0 || height == 0 || width > 1 << 16 || height > 1 << 16 {
-            return refuse("--width and --height must be between 1 and 65536");
+        if i64::from(width.max(height)) > LARGEST {
+            return refuse(&format!(
+                "an image of {width} x {height} pixels, as the camera's shape makes it, is too large: {LARGEST} at most each way"
+            ));
         }
-        if min_trials == 0 || min_trials > max_trials {
-            return refuse("--min-trials must be at least 1 and at most --max-trials");
+        if min_trials > max_trials {
+            return refuse(&format!("--min-trials {min_trials} is more than --max-trials {max_trials}"));
         }
         if !(error > 0.0 && hires_error > 0.0 && lores_error > 0.0) {
-            return refuse("errors must be above 0 (0.05 is 5 %)");
+            return refuse("--error, --hires-error and --lores-error must be above 0 (0.05 is 5 %)");
         }
         if self.time_limit.is_some_and(|t| !(t > 0.0 && t < 1e9)) {
             return refuse("--time-limit must be a number of seconds above 0");
@@ -420,8 +438,8 @@ impl Options {
         let s = &stats.seconds;
         let e = &stats.error;
         self.talk.say(format!(
-            "{}{}: {:.1} s (load {:.1}, simplify {:.1}, build {:.1}, radiosity {:.1}, HIRES {:.1}, LORES {:.1})",
-            names(outputs),
+            "{}{}: {:.1} s (load {:.1}, simplify {:.1}, build {:.1}, radiosity {:.1}, HIRES {:.1}, LORES {:.1}, bias meter {:.1})",
+            places::names(outputs),
             stopped.map_or_else(String::new, |advice| format!(" (stopped early, with the trials there were{advice})")),
             s.total,
             s.load,
@@ -429,10 +447,14 @@ impl Options {
             s.build,
             s.radiosity,
             s.hires,
-            s.lores
+            s.lores,
+            s.bias
         ));
-        let mut errors =
-            format!("noise {:.2} % (HIRES {:.2}, LORES {:.2})", 100.0 * e.total, 100.0 * e.hires, 100.0 * e.lores);
+        let mut errors = if self.spp == Some(1) {
+            "noise not known from one trial a pixel".to_owned()
+        } else {
+            format!("noise {:.2} % (HIRES {:.2}, LORES {:.2})", 100.0 * e.total, 100.0 * e.hires, 100.0 * e.lores)
+        };
         if let (Some(bias), Some(ci)) = (e.bias, e.bias_ci) {
             errors += &format!(", bias of the mean {:+.2} +- {:.2} %", 100.0 * bias, 100.0 * ci);
         }

@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use clap::Args;
 
 use super::options::{LengthOrAuto, SceneOptions, Talk, load};
+use super::places;
 use crate::error::{Error, Result};
 use crate::pipeline::{BackendKind, Method, Prepared, Settings, Stats, choose_camera, simplify_only};
 use crate::radiosity::{self, Solution};
@@ -83,6 +84,13 @@ impl Options {
 /// Bad options, bad input, a failing library, a file that cannot be written.
 pub fn run(options: &Options) -> Result<ExitCode> {
     let table = options.report.as_deref().map(table_format).transpose()?;
+    if let Some(path) = options.output.as_deref().filter(|path| path.extension() != Some("glb".as_ref())) {
+        return Err(Error::Usage(format!(
+            "--output {}: the name must end in .glb, which is what is written",
+            path.display()
+        )));
+    }
+    places::check(&[], [options.output.as_deref(), options.report.as_deref()])?;
     let progress = options.talk.progress();
     let mut stats = Stats::new();
     let scene = load(&options.scene, &mut stats)?;

@@ -47,7 +47,10 @@ pub fn merge(paths: &[PathBuf]) -> Result<(Image, Metadata)> {
         }
         for i in part.places() {
             if let Some(other) = parts.get(holder[i] as usize) {
-                return Err(part.refuse(&format!("it overlaps {}", other.path.display())));
+                return Err(part.refuse(&match part.path == other.path {
+                    true => "it is given twice".to_owned(),
+                    false => format!("it overlaps {}", other.path.display()),
+                }));
             }
             holder[i] = number as u32;
         }

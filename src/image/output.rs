@@ -132,7 +132,8 @@ pub fn write(path: &Path, image: &Image, metadata: &Metadata, options: &WriteOpt
 /// Writes to a temporary file in the folder of the target, which goes when it is dropped.
 fn write_beside(path: &Path, image: &Image, metadata: &Metadata, options: &WriteOptions) -> Result<Unfinished> {
     let encoding = Encoding::of(path)?;
-    let file = temporary(path)?;
+    // The extension stays: OpenImageIO chooses the format by it.
+    let file = Unfinished::new(path).map_err(|error| failure(path, error))?;
     let size = (image.width(), image.height());
     let tile = if options.tiled { TILE } else { 0 };
     let layout = Layout { compression: options.compression.map(Compression::name), tile };
@@ -154,21 +155,6 @@ fn write_beside(path: &Path, image: &Image, metadata: &Metadata, options: &Write
     };
     oiio::write(file.path(), size, &names, &samples, metadata, layout).map_err(|reason| failure(path, reason))?;
     Ok(file)
-}
-
-fn temporary(path: &Path) -> Result<Unfinished> {
-    match std::fs::metadata(path) {
-        // A rename would replace a device or a pipe by a file.
-        Ok(there) if !there.is_file() => return Err(failure(path, "something that is not a regular file is there")),
-        Ok(there) if there.permissions().readonly() => return Err(failure(path, "it exists and is write-protected")),
-        _ => (),
-    }
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    if !folder.is_dir() {
-        return Err(failure(path, format!("there is no folder {}", folder.display())));
-    }
-    // The extension stays: OpenImageIO chooses the format by it.
-    Unfinished::new(path).map_err(|error| failure(path, format!("{} is not writable: {error}", folder.display())))
 }
 
 /// Programs that know one image per file take the first channels.

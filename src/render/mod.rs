@@ -136,13 +136,13 @@ pub fn render_rounds(
     progress: &Progress,
     watch: &mut dyn FnMut(&Round<'_>) -> bool,
 ) {
-    let over = || progress.stopped();
+    let stopped = || progress.stopped();
     let mut cache = IrradianceCache::default();
-    if wants_cache(world, params) && !cache.fill(world, camera, params, &over, &mut |_| {}) {
+    if wants_cache(world, params) && !cache.fill(world, camera, params, &stopped, &mut |_| {}) {
         return;
     }
     let world = &World { cache: wants_cache(world, params).then_some(&cache).or(world.cache), ..*world };
-    let renderer = Renderer { world, camera, params, over: &over };
+    let renderer = Renderer { world, camera, params, stopped: &stopped, late: &|| false };
     let mut film = params.film();
     let plan = Plan::even(params.max_trials, film.tiles.iter());
     let bar =
@@ -178,15 +178,16 @@ pub fn resume(
     mut watcher: Option<&mut dyn Watcher>,
 ) -> Rendering {
     let deadline = params.time_limit.map(|limit| Instant::now() + limit);
-    let over = || progress.stopped() || deadline.is_some_and(|d| Instant::now() >= d);
+    let late = || deadline.is_some_and(|d| Instant::now() >= d);
+    let stopped = || progress.stopped();
     let interpolates = wants_cache(world, params);
-    let mut complete = !over();
+    let mut complete = !stopped();
     if interpolates {
-        complete = complete && fill_cache(&mut session, world, camera, params, progress, &over, &mut watcher);
+        complete = complete && fill_cache(&mut session, world, camera, params, progress, &stopped, &mut watcher);
     }
     let cache = interpolates.then(|| Arc::clone(&session.cache));
     let world = &World { cache: cache.as_deref().or(world.cache), ..*world };
-    let renderer = Renderer { world, camera, params, over: &over };
+    let renderer = Renderer { world, camera, params, stopped: &stopped, late: &late };
     complete = complete && renderer.plan(&mut session, progress, &mut watcher);
     complete = complete && renderer.expose(&session, progress, &mut watcher);
     if let Some(watcher) = watcher {

@@ -36,7 +36,7 @@ pub(super) fn fill_cache(
     camera: &Camera,
     params: &RenderParams,
     progress: &Progress,
-    over: &(dyn Fn() -> bool + Sync),
+    stopped: &(dyn Fn() -> bool + Sync),
     watcher: &mut Option<&mut dyn Watcher>,
 ) -> bool {
     let stage = progress.stage("irradiance cache", 0);
@@ -48,7 +48,7 @@ pub(super) fn fill_cache(
         session.filling = before;
         session.filling += start.spent();
     };
-    let complete = cache.fill(world, camera, params, over, &mut |cache| {
+    let complete = cache.fill(world, camera, params, stopped, &mut |cache| {
         if let Some(watcher) = watcher.as_deref_mut().filter(|w| w.wait().is_zero()) {
             keep(session, cache);
             watcher.look(session, Moment::Meanwhile);
@@ -64,8 +64,10 @@ pub(super) struct Renderer<'a> {
     pub world: &'a World<'a>,
     pub camera: &'a Camera,
     pub params: &'a RenderParams,
-    /// Says when no new trials are to be begun.
-    pub over: &'a (dyn Fn() -> bool + Sync),
+    /// Says when the work is to end.
+    pub stopped: &'a (dyn Fn() -> bool + Sync),
+    /// Says when the time for it is over: every tile has its first trials all the same, so that there is an image.
+    pub late: &'a (dyn Fn() -> bool + Sync),
 }
 
 impl Renderer<'_> {
@@ -135,7 +137,7 @@ impl Renderer<'_> {
             // Others look at the tile meanwhile: what is worked on is a copy.
             let mut tile = tiles.get(number).clone();
             while let Some(slice) = Slice::next(plan, tile.next, end) {
-                if (self.over)() {
+                if (self.stopped)() || tile.next > 0 && (self.late)() {
                     return false;
                 }
                 if tile.next > LEARN_FROM && tile.next.is_power_of_two() {

@@ -232,7 +232,7 @@ pub fn simplify(
         let too_long = drop_strips(&mut dropper, scene, &mut surfaces, &map.of_triangle, extent);
         if too_long > 0 {
             warnings.push(format!(
-                "{too_long} surfaces have less area than A_thresh = {a_thresh:.3e} but are longer than {:.3e} and stay normal",
+                "{too_long} surfaces have less area than A_thresh = {a_thresh:.3e} but are longer than {:.3e}: they stay as they are, which costs time but no accuracy",
                 extent.compact
             ));
         }

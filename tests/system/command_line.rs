@@ -88,16 +88,18 @@ fn files_that_are_no_scenes_are_refused_in_one_line() {
 fn options_that_make_no_sense_are_refused() {
     let bench = Bench::new();
     let before = bench.files();
-    let cases: [(&[&str], &str); 13] = [
+    let cases: [(&[&str], &str); 15] = [
         (&["--camera", "nobody"], "nobody"),
         (&["--beta", "2"], "--beta"),
         (&["--r-thresh=-1"], "--r-thresh"),
         (&["--r-thresh", "NaN"], "--r-thresh"),
         (&["--patch-size", "0"], "--patch-size"),
         (&["--unshot", "0"], "--unshot"),
-        (&["--width", "0"], "--width"),
+        (&["--error", "-1"], "--error"),
+        (&["--sky", "--sun", "-5,20"], "--sun"),
+        (&["-o", "./out.exr"], "out.exr"),
+        (&["--stats", "out.exr"], "out.exr"),
         (&["--threads", "0"], "--threads"),
-        (&["--spp", "0"], "trials"),
         (&["--min-trials", "8", "--max-trials", "4"], "--min-trials"),
         (&["--error", "0"], "error"),
         (&["--time-limit", "0"], "--time-limit"),
@@ -109,6 +111,9 @@ fn options_that_make_no_sense_are_refused() {
     // What the option parser refuses by itself comes with its usage: more lines, the same exit code.
     for arguments in [
         &["render", "room.gltf"][..],
+        &["render", "room.gltf", "-o", "out.exr", "--width", "0"],
+        &["render", "room.gltf", "-o", "out.exr", "--width", "-5"],
+        &["render", "room.gltf", "-o", "out.exr", "--spp", "0"],
         &["render", "room.gltf", "-o", "out.exr", "--method", "magic"],
         &["render", "room.gltf", "-o", "out.exr", "--r-thresh", "wide"],
         &["render", "room.gltf", "-o", "out.exr", "--layers", "hires,colour"],
@@ -669,7 +674,6 @@ fn manual_and_completions_know_every_option() {
     }
     assert!(text(&["man"]).contains("merge"));
     refused(&bench.gsii(&["man", "paint"]), &["paint", "render"]);
-    std::fs::create_dir(bench.path("pages")).unwrap();
     text(&["man", "--all", "pages"]);
     let pages: Vec<_> = std::fs::read_dir(bench.path("pages")).unwrap().collect();
     assert!(pages.len() >= 8 && bench.path("pages/gsii-render.1").exists(), "{pages:?}");
@@ -686,5 +690,6 @@ fn outputs_of_simplify_are_refused_in_one_line() {
         assert!(stderr(&output).lines().count() == 1 && stderr(&output).contains(target), "{}", stderr(&output));
     }
     refused(&bench.gsii(&["simplify", "room.gltf", "--report", "a.txt"]), &["a.txt"]);
+    refused(&bench.gsii(&["simplify", "room.gltf", "-o", "a.obj"]), &["a.obj", ".glb"]);
     assert_eq!(bench.files(), before);
 }

@@ -180,13 +180,10 @@ fn time_limit_and_ctrl_c_lose_nothing() {
         }
         assert!(text.contains("--resume goes on from a.exr.checkpoint"), "{text}");
         stops += 1;
-        // On a busy machine, the first stops may come before the first trial.
-        assert_eq!(code, Some(i32::from(text.contains("before the first trial"))), "{text}");
-        if code == Some(0) {
-            assert!(text.contains("stopped early"), "{text}");
-            assert!(trials() >= before, "each stop has at least what the one before had");
-            before = trials();
-        }
+        assert_eq!(code, Some(0), "there is an image however short the time: {text}");
+        assert!(text.contains("stopped early"), "{text}");
+        assert!(trials() >= before.max(1.0), "each stop has at least what the one before had");
+        before = trials();
     }
     let child = bench.start(&arguments);
     std::thread::sleep(Duration::from_millis(300));
