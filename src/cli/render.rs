@@ -101,7 +101,7 @@ pub struct Options {
     /// Most trials of a pixel in each pass
     #[arg(long, value_name = "N", default_value_t = 512, value_parser = clap::value_parser!(u32).range(1..), help_heading = "Quality")]
     max_trials: u32,
-    /// Fixed sampling: short for --min-trials N --max-trials N
+    /// Fixed sampling: short for --min-trials N --max-trials N (also --samples N)
     #[arg(long, visible_alias = "samples", value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Quality", conflicts_with_all = ["min_trials", "max_trials", "error", "hires_error", "lores_error"])]
     spp: Option<u32>,
     /// Gather indirect light for each pixel by itself, with no interpolation between places: slower, and without its error

@@ -140,7 +140,7 @@ impl Renderer<'_> {
                 if (self.stopped)() || tile.next > 0 && (self.late)() {
                     return false;
                 }
-                if tile.next > LEARN_FROM && tile.next.is_power_of_two() {
+                if tile.next > 0 && lesson_after(tile.next - 1) == tile.next {
                     tile.guide.learn();
                 }
                 (ws.counts, ws.times) = Default::default();
@@ -163,6 +163,11 @@ impl Renderer<'_> {
     }
 }
 
+/// The number of trials at which a tile that has `trials` next learns where light is: they double, whatever is planned.
+fn lesson_after(trials: u32) -> u32 {
+    (trials + 1).max(LEARN_FROM).next_power_of_two()
+}
+
 /// The next trials of a tile: as many for all of its pixels that want any.
 struct Slice {
     trials: u32,
@@ -182,8 +187,7 @@ impl Slice {
         };
         let pixels = [Passes::BOTH, Passes::HIRES, Passes::LORES].map(with);
         let count: u32 = pixels.iter().map(|(_, list)| list.len() as u32).sum();
-        // Tiles learn where light is after numbers of trials that double, whatever is planned.
-        let end = end.min((first + 1).max(LEARN_FROM).next_power_of_two());
+        let end = end.min(lesson_after(first));
         // No pixel is to be overtaken by the limits of its passes.
         let limits = plan.iter().flat_map(|a| [a.hires, a.lores]).filter(|&limit| limit > first);
         let limit = limits.min().unwrap_or(first).min(end);

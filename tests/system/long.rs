@@ -171,7 +171,7 @@ fn time_limit_and_ctrl_c_lose_nothing() {
         let image = image::read(&bench.path("a.exr")).unwrap();
         image.channel("trials.hires").unwrap().iter().map(|&t| f64::from(t)).sum::<f64>()
     };
-    let mut before = 0.0;
+    let mut before = 0.0_f64;
     let mut stops = 0;
     for _ in 0..3 {
         let (code, text) = bench.run(&[&arguments[..], &["--time-limit", "0.25"]].concat());
@@ -238,9 +238,12 @@ fn checkpoints_of_something_else_are_refused() {
     // Without --resume it is replaced, with a warning.
     let text = bench.render(&[&fixed[..], &["--time-limit", "0.1"]].concat());
     assert!(text.contains("will be replaced"), "{text}");
-    for option in [&["--checkpoint-every", "0"][..], &["--checkpoint-every=-1"], &["--checkpoint", "nowhere/c"]] {
+    for option in [&["--checkpoint-every", "0"][..], &["--checkpoint-every=-1"]] {
         refused(&[&fixed[..], option].concat(), &["--checkpoint"]);
     }
+    let (code, text) = bench.run(&[&fixed[..], &["--checkpoint", "nowhere/c"]].concat());
+    assert_eq!((code, text.lines().count()), (Some(1), 1), "{text}");
+    assert!(text.contains("no folder nowhere"), "{text}");
 }
 
 #[test]

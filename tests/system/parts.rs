@@ -105,7 +105,8 @@ fn merged_parts_are_the_whole_image() {
 
     for (parts, words) in [
         (&["1.exr", "2.exr", "4.exr"][..], "missing"),
-        (&["1.exr", "2.exr", "2.exr", "4.exr"], "overlaps"),
+        (&["1.exr", "2.exr", "2.exr", "4.exr"], "given twice"),
+        (&["1.exr", "2.exr", "./2.exr", "4.exr"], "overlaps"),
         (&["1.exr", "whole.exr"], "--tile or --crop"),
         (&["1.exr", "nowhere.exr"], "nowhere.exr"),
     ] {

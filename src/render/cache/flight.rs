@@ -4,11 +4,8 @@
 //! frame to frame in patches as large as the reach of records, which the eye sees as flicker where it does not see it as noise.
 //! With one cache for all, the error stays on the surfaces like paint.
 
-use rayon::prelude::*;
-
-use super::{IrradianceCache, PASSES, Record, STREAM, Strata, gather};
+use super::{IrradianceCache, PASSES, Record, STREAM, Strata, gather_all};
 use crate::render::view::ViewRays;
-use crate::render::workspace::Workspace;
 use crate::render::world::World;
 use crate::sampling::hash_all;
 use crate::scene::Camera;
@@ -29,15 +26,10 @@ impl IrradianceCache {
             for (number, (camera, size)) in (0u32..).zip(views) {
                 let view = ViewRays::new(camera, *size, hash_all(&[seed, STREAM, number]));
                 let places = cache.places(world, &view, *size, spacing, pass);
-                let fresh: Vec<Option<Record>> = (0..places.len())
-                    .into_par_iter()
-                    .map_init(Workspace::default, |ws, place| {
-                        let stream = hash_all(&[seed, STREAM, pass, number, place as u32]);
-                        if over() { None } else { gather(world, far, ws, &places[place], strata, stream, pass == 0) }
-                    })
-                    .collect();
-                if fresh.iter().any(Option::is_some) {
-                    cache.records.extend(fresh.into_iter().flatten());
+                let stream = |place: usize| hash_all(&[seed, STREAM, pass, number, place as u32]);
+                let fresh = gather_all(world, far, (&places, 0..places.len()), strata, pass, &stream, over);
+                if !fresh.is_empty() {
+                    cache.records.extend(fresh);
                     cache.settle(far.r_thresh);
                 }
             }

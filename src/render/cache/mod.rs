@@ -11,6 +11,8 @@ mod index;
 mod nearby;
 mod record;
 
+use std::ops::Range;
+
 use glam::Vec3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -131,18 +133,12 @@ impl IrradianceCache {
             let places = self.places(world, &view, size, spacing, pass);
             while self.next < places.len() {
                 let chunk = self.next..(self.next + CHUNK).min(places.len());
-                let gathered: Vec<Option<Record>> = chunk
-                    .clone()
-                    .into_par_iter()
-                    .map_init(Workspace::default, |ws, number| {
-                        let stream = hash_all(&[seed, STREAM, pass, number as u32]);
-                        if over() { None } else { gather(world, far, ws, &places[number], strata, stream, pass == 0) }
-                    })
-                    .collect();
+                let stream = |number: usize| hash_all(&[seed, STREAM, pass, number as u32]);
+                let gathered = gather_all(world, far, (&places, chunk.clone()), strata, pass, &stream, over);
                 if over() {
                     return false;
                 }
-                self.fresh.extend(gathered.into_iter().flatten());
+                self.fresh.extend(gathered);
                 self.next = chunk.end;
                 each(self);
             }
@@ -262,7 +258,25 @@ struct Place {
     footprint: f32,
 }
 
-/// Gathers the light of one place.
+/// Gathers the light of some of the places of a pass, each with random numbers of its own `stream`; of none from when `over` says so.
+fn gather_all(
+    world: &World<'_>,
+    far: &FarField<'_>,
+    (places, chosen): (&[Place], Range<usize>),
+    strata: Strata,
+    pass: u32,
+    stream: &(dyn Fn(usize) -> u32 + Sync),
+    over: &(dyn Fn() -> bool + Sync),
+) -> Vec<Record> {
+    // Places of the first pass show by two values of each how noisy records are.
+    let one = |ws: &mut Workspace, number: usize| {
+        if over() { None } else { gather(world, far, ws, &places[number], strata, stream(number), pass == 0) }
+    };
+    let records: Vec<Option<Record>> = chosen.into_par_iter().map_init(Workspace::default, one).collect();
+    records.into_iter().flatten().collect()
+}
+
+/// Gathers the light of one place, once or twice.
 fn gather(
     world: &World<'_>,
     far: &FarField<'_>,
