@@ -15,7 +15,7 @@ use crate::study;
 #[derive(Args, Debug)]
 pub struct Options {
     /// glTF 2.0 files (.glb or .gltf) to compare all methods on
-    #[arg(required = true, value_name = "SCENE")]
+    #[arg(required_unless_present_any = ["curves", "scaling"], value_name = "SCENE")]
     scenes: Vec<PathBuf>,
     /// Folder for the report; what is finished is kept in its folder 'work', and a study that was stopped goes on
     #[arg(short, long, value_name = "DIR")]

@@ -14,13 +14,16 @@ use rayon::prelude::*;
 use super::band_shares;
 use super::openings::Openings;
 use crate::backend::RayScene;
-use crate::sampling::basis;
+use crate::sampling::{basis, hash_all, sobol};
 use crate::scene::{Environment, Scene, SunDisk};
 
 /// Most blocks around the horizon and from pole to pole.
 const MOST: [usize; 2] = [16, 8];
 /// Blocks at most, and the sun.
 pub(super) const BLOCKS: usize = MOST[0] * MOST[1] + 1;
+
+/// Directions within each block that are tried to find out from where it is seen: so few that they need not be drawn for each point.
+const LOOKS: u32 = 64;
 
 /// An [`Environment`], ready to be sampled.
 #[derive(Debug)]
@@ -112,9 +115,16 @@ impl EnvironmentLight {
 
     /// Finds out what of it is seen from where.
     pub(super) fn look_out(&mut self, scene: &Scene, rays: &dyn RayScene, seed: u32) {
-        self.openings = Openings::find(scene, rays, seed, |block, u| {
-            (self.blocks.power[block] > 0.0).then(|| self.direction_in(block, u))
-        });
+        let in_block = |block: usize| {
+            let number = if self.blocks.power[block] > 0.0 { LOOKS } else { 0 };
+            let look = |k: u32| {
+                let [x, y, ..] = sobol(k, 0, hash_all(&[seed, block as u32]));
+                self.direction_in(block, [x, y])
+            };
+            (0..number).map(look).collect()
+        };
+        let directions: Vec<Vec<Vec3>> = (0..BLOCKS).map(in_block).collect();
+        self.openings = Openings::find(scene, rays, seed, &directions);
     }
 
     /// Sets middle and extent of a block of the map.
@@ -298,8 +308,10 @@ fn running_shares(values: impl Iterator<Item = f64>) -> Vec<f32> {
 
 /// The entry that holds `u`, 0..1, and where in it `u` lies, 0..1.
 fn invert(sums: &[f32], u: f32) -> (usize, f64) {
-    let last = sums.partition_point(|&s| s < 1.0).min(sums.len() - 1);
-    let i = sums.partition_point(|&s| s <= u).min(last);
+    let found = sums.partition_point(|&s| s <= u);
+    // By rounding, `u` may be above the last sum: then it is in the last entry that has a width.
+    let last = || sums.partition_point(|&s| s < sums[sums.len() - 1]);
+    let i = if found < sums.len() { found } else { last() };
     let before = if i == 0 { 0.0 } else { f64::from(sums[i - 1]) };
     let width = f64::from(sums[i]) - before;
     (i, if width > 0.0 { ((f64::from(u) - before) / width).clamp(0.0, 1.0) } else { 0.5 })

@@ -55,14 +55,9 @@ struct Lookout {
 }
 
 impl Openings {
-    /// Traces rays from points on the surfaces of each cell: one into each block above the surface. `direction` gives a
-    /// direction within a block, or `None` for blocks that send no light.
-    pub(super) fn find(
-        scene: &Scene,
-        rays: &dyn RayScene,
-        seed: u32,
-        direction: impl Fn(usize, [f32; 2]) -> Option<Vec3> + Sync,
-    ) -> Self {
+    /// Traces rays from points on the surfaces of each cell: one into each block above the surface. `directions` holds a few
+    /// directions within each block, none for blocks that send no light.
+    pub(super) fn find(scene: &Scene, rays: &dyn RayScene, seed: u32, directions: &[Vec<Vec3>]) -> Self {
         let bounds = scene.mesh.bounds;
         if bounds.is_empty() {
             return Self::default();
@@ -79,7 +74,7 @@ impl Openings {
         let lookouts = grid.lookouts(scene, seed);
         let cells: Vec<&[Lookout]> = lookouts.chunk_by(|a, b| a.cell == b.cell).collect();
         let counts: Vec<Counts> =
-            cells.par_iter().map(|points| look_out(scene, rays, seed, points, &direction)).collect();
+            cells.par_iter().map(|points| look_out(scene, rays, seed, points, directions)).collect();
         for (entry, points) in cells.iter().enumerate() {
             grid.index[points[0].cell as usize] = entry as u32;
         }
@@ -165,13 +160,7 @@ fn factors<'a>(counts: impl Iterator<Item = &'a Counts>) -> [f32; BLOCKS] {
 }
 
 /// What the points of a cell see.
-fn look_out(
-    scene: &Scene,
-    rays: &dyn RayScene,
-    seed: u32,
-    points: &[Lookout],
-    direction: &impl Fn(usize, [f32; 2]) -> Option<Vec3>,
-) -> Counts {
+fn look_out(scene: &Scene, rays: &dyn RayScene, seed: u32, points: &[Lookout], directions: &[Vec<Vec3>]) -> Counts {
     let mut queries = Vec::with_capacity(points.len() * BLOCKS);
     let mut blocks = Vec::with_capacity(points.len() * BLOCKS);
     for point in points {
@@ -180,9 +169,11 @@ fn look_out(
         let surface = SurfacePoint::new(scene, &hit);
         let front = point.rank & 1 == 0;
         let normal = if front { surface.geometric_normal } else { -surface.geometric_normal };
-        for block in 0..BLOCKS {
-            let u = [0, 1].map(|k| unit(hash_all(&[point.rank, block as u32, k])));
-            let Some(direction) = direction(block, u).filter(|d| d.dot(normal) > 0.0) else { continue };
+        for (block, choice) in directions.iter().enumerate().filter(|(_, choice)| !choice.is_empty()) {
+            let direction = choice[hash_all(&[point.rank, block as u32]) as usize % choice.len()];
+            if direction.dot(normal) <= 0.0 {
+                continue;
+            }
             queries.push(Ray::new(surface.ray_origin(direction), direction));
             blocks.push(block);
         }

@@ -25,8 +25,19 @@ pub enum Crossing {
 
 /// When `errors` of a run fall below `level`; core seconds, preparation included.
 pub fn crossing(record: &Record, level: f64, errors: impl Fn(&Point) -> Option<Errors>) -> Crossing {
-    let curve: Vec<(f64, Errors)> =
-        record.points.iter().filter_map(|p| Some((record.total(p).cpu, errors(p)?))).collect();
+    crossing_after(record, level, record.preparation.all.cpu, |_| 1.0, errors)
+}
+
+/// The same for a part of a run: core seconds from `preparation` on and that `share` of the time of rendering.
+pub fn crossing_after(
+    record: &Record,
+    level: f64,
+    preparation: f64,
+    share: impl Fn(&Point) -> f64,
+    errors: impl Fn(&Point) -> Option<Errors>,
+) -> Crossing {
+    let spent = |p: &Point| preparation + share(p) * p.rendering.cpu;
+    let curve: Vec<(f64, Errors)> = record.points.iter().filter_map(|p| Some((spent(p), errors(p)?))).collect();
     let Some(&(end, last)) = curve.last() else { return Crossing::Unknown };
     // From the end: the last time that the curve passes the level is when it stays below.
     if let Some(k) = curve.iter().rposition(|(_, e)| e.rel_mse >= level) {
@@ -47,7 +58,6 @@ pub fn crossing(record: &Record, level: f64, errors: impl Fn(&Point) -> Option<E
     }
     // Beyond the curve, what is noise falls with the number of trials; the bias stays.
     let noise = (last.rel_mse - floor).max(0.0);
-    let preparation = record.preparation.all.cpu;
     Crossing::About(preparation + (end - preparation) * noise / (level - floor))
 }
 
@@ -96,6 +106,7 @@ mod tests {
             noise: 0.0,
             dev: [0.0; 2],
             whole: Some(Errors { rel_mse: *rel_mse, bias_rel_mse: bias, ..Errors::default() }),
+            direct: None,
             indirect: None,
         };
         Record {

@@ -74,6 +74,14 @@ impl Picture {
         Some(picture)
     }
 
+    /// HIRES alone.
+    pub fn direct(&self) -> Halves {
+        let less = |(whole, lores): (&Plane, &Plane)| -> Plane {
+            whole.iter().zip(lores).map(|(w, l)| std::array::from_fn(|c| w[c] - l[c])).collect()
+        };
+        Halves(std::array::from_fn(|k| less((&self.whole.0[k], &self.indirect.0[k]))))
+    }
+
     /// Channels `R,G,B` and the layer `lores`, means of both halves.
     pub fn develop(&self, width: u32) -> Image {
         let mut image = Image::new(width, self.whole.0[0].len() as u32 / width);

@@ -79,6 +79,8 @@ pub struct Point {
     pub dev: [f64; 2],
     /// Error of the image; none where there is no reference.
     pub whole: Option<Errors>,
+    /// Error of the direct light alone.
+    pub direct: Option<Errors>,
     /// Error of the indirect light alone.
     pub indirect: Option<Errors>,
 }

@@ -47,6 +47,8 @@ pub fn write(study: &Study, output: &Path) -> Result<()> {
     if !study.scaling.is_empty() {
         all.push(tables::scaling(&study.scaling));
     }
+    // Without scenes that all methods run on, some have nothing to say.
+    all.retain(|table| !table.rows.is_empty());
     let goals = tables::goals(&chapters);
     let mut sections = Vec::new();
     for chapter in &study.chapters {

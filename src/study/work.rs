@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::error::{Errors, Picture, compare};
+use super::error::{Halves, Picture, compare};
 use super::plan::{Run, Sampling};
 use super::record::{Point, Preparation, Record, Store};
 use super::reference::Reference;
@@ -171,12 +171,14 @@ impl Keep<'_> {
             noise: film.relative_errors().total,
             dev: [mean_dev(film, |p| &p.hires), mean_dev(film, |p| &p.lores)],
             whole: None,
+            direct: None,
             indirect: None,
         };
         if let (Some(reference), Some(picture)) = (self.reference, Picture::of(film)) {
             let (width, coarse) = (film.width as usize, self.subject.coarse());
-            let errors = |image, truth| -> Errors { compare(image, truth, width, coarse) };
+            let errors = |image: &Halves, truth: &Halves| compare(image, truth, width, coarse);
             point.whole = Some(errors(&picture.whole, &reference.whole));
+            point.direct = Some(errors(&picture.direct(), &reference.direct()));
             let gathers = film.pixels().any(|p| p.lores.trials() > 0);
             point.indirect = gathers.then(|| errors(&picture.indirect, &reference.indirect));
             write_image(&self.store.image(key, trials), &picture, film.width)?;
