@@ -5,6 +5,10 @@ use rayon::prelude::*;
 
 use super::{ImportNotes, Mesh};
 
+/// Twice the area of the smallest triangle that is kept, squared scene units: products of smaller edges lose digits in single precision,
+/// and Embree takes them for nothing at all.
+const LEAST_CROSS: f64 = (f32::MIN_POSITIVE / f32::EPSILON) as f64;
+
 /// Why a triangle is dropped.
 #[derive(Clone, Copy, PartialEq)]
 enum Flaw {
@@ -43,11 +47,12 @@ fn flaw(mesh: &Mesh, triangle: [u32; 3]) -> Flaw {
     }
     let [a, b, c] = corners.map(Vec3::as_dvec3);
     let longest = (b - a).length().max((c - b).length()).max((a - c).length());
-    let height = (b - a).cross(c - a).length() / longest;
+    let cross = (b - a).cross(c - a).length();
+    let height = cross / longest;
     // Each corner was rounded by up to 2^-24 of its coordinates: a height of twice that (opposite errors of corner and
     // base) cannot be told from zero, and the normal is noise. Zero edges give 0/0.
     let extent = [a, b, c].iter().fold(0.0, |m: f64, p: &DVec3| m.max(p.abs().max_element()));
-    if height > extent * 2.0_f64.powi(-23) { Flaw::None } else { Flaw::Degenerate }
+    if height > extent * 2.0_f64.powi(-23) && cross >= LEAST_CROSS { Flaw::None } else { Flaw::Degenerate }
 }
 
 /// Marks triangles with the same three corners as another; of those, the first that emits stays, else the first. Gives each that

@@ -90,6 +90,14 @@ fn useless_triangles_are_dropped_and_counted() {
 }
 
 #[test]
+fn triangles_too_small_for_single_precision_are_dropped() {
+    let of_size = |size: f64| build(&[(square(), grey(), DAffine3::from_scale(DVec3::splat(size)))]);
+    let [small, too_small] = [1e-15, 1e-16].map(of_size);
+    assert_eq!((small.mesh.triangles.len(), small.notes.degenerate_triangles), (2, 0));
+    assert_eq!((too_small.mesh.triangles.len(), too_small.notes.degenerate_triangles), (0, 2));
+}
+
+#[test]
 fn of_two_equal_triangles_the_emitter_stays() {
     let lamp = Material::emitter(Vec3::ONE, Vec3::ZERO);
     let scene = build(&[(square(), grey(), at(0.0, 0.0, 0.0)), (square(), lamp, at(0.0, 0.0, 0.0))]);
