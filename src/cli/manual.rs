@@ -1,12 +1,12 @@
 //! `gsii man` and `gsii completions`: made from the same definitions as `--help`.
 
-use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, Command};
 use clap_complete::Shell;
 
+use super::page;
 use crate::error::{Error, Result};
 
 /// Options of `gsii man`.
@@ -47,9 +47,9 @@ pub fn man(options: &ManOptions, mut command: Command) -> Result<ExitCode> {
             }
         },
     };
-    let mut page = Vec::new();
-    clap_mangen::Man::new(chosen).render(&mut page).map_err(standard_output)?;
-    print(&page)
+    let mut text = Vec::new();
+    clap_mangen::Man::new(chosen).render(&mut text).map_err(page::failed)?;
+    page::print(&text).map(|()| ExitCode::SUCCESS)
 }
 
 /// Prints a completion script of `command`, the whole program.
@@ -60,18 +60,5 @@ pub fn completions(options: &CompletionOptions, mut command: Command) -> Result<
     let name = command.get_name().to_owned();
     let mut script = Vec::new();
     clap_complete::generate(options.shell, &mut command, name, &mut script);
-    print(&script)
-}
-
-fn print(text: &[u8]) -> Result<ExitCode> {
-    match std::io::stdout().lock().write_all(text) {
-        // The reader has seen enough.
-        Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(ExitCode::SUCCESS),
-        Err(error) => Err(standard_output(error)),
-        Ok(()) => Ok(ExitCode::SUCCESS),
-    }
-}
-
-fn standard_output(error: std::io::Error) -> Error {
-    Error::Output { path: Path::new("standard output").to_owned(), reason: error.to_string() }
+    page::print(&script).map(|()| ExitCode::SUCCESS)
 }

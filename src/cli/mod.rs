@@ -9,6 +9,7 @@ pub mod merge;
 pub mod options;
 pub mod output;
 pub mod outside;
+pub mod page;
 pub mod places;
 pub mod render;
 pub mod simplify;

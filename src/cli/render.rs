@@ -279,6 +279,9 @@ impl Options {
             prepared.resume(camera, params, session, progress, Some(&mut watchers))
         };
         stats.record_rendering(&rendering);
+        if let Some(cache) = rendering.cache.as_deref().or(prepared.world().cache) {
+            stats.record_interpolation(cache, &rendering.film);
+        }
         let advice = kept.map_or_else(String::new, Checkpoint::advice);
         let when = match view.frame {
             Some(frame) if progress.stopped() => Some(format!("in frame {frame}")),
@@ -455,6 +458,9 @@ impl Options {
         } else {
             format!("noise {:.2} % (HIRES {:.2}, LORES {:.2})", 100.0 * e.total, 100.0 * e.hires, 100.0 * e.lores)
         };
+        if let Some(interpolation) = e.interpolation {
+            errors += &format!(", interpolation {:.2} %, together {:.2} %", 100.0 * interpolation, 100.0 * e.image);
+        }
         if let (Some(bias), Some(ci)) = (e.bias, e.bias_ci) {
             errors += &format!(", bias of the mean {:+.2} +- {:.2} %", 100.0 * bias, 100.0 * ci);
         }
@@ -513,6 +519,8 @@ fn metadata(stats: &Stats) -> Metadata {
         ("hires", Some(e.hires)),
         ("lores", Some(e.lores)),
         ("total", Some(e.total)),
+        ("interpolation", e.interpolation),
+        ("image", Some(e.image)),
         ("radiosity", Some(e.radiosity)),
         ("fit", Some(e.fit)),
         ("bias", e.bias),

@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use clap::Args;
 
 use super::options::{LengthOrAuto, SceneOptions, Talk, load};
+use super::page::Page;
 use super::places;
 use crate::error::{Error, Result};
 use crate::pipeline::{BackendKind, Method, Prepared, Settings, Stats, choose_camera, simplify_only};
@@ -119,7 +120,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
             Table::Json => report::write_json(&rows, out),
         })?;
     }
-    print_table(&scene, &simplified, &settings, solution.as_ref(), &stats)?;
+    table_of(&scene, &simplified, &settings, solution.as_ref(), &stats)?.print()?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -138,13 +139,14 @@ fn table_format(path: &Path) -> Result<Table> {
 }
 
 /// The paper's comparison of both environments, and how well the boxes fit.
-fn print_table(
+fn table_of(
     scene: &Scene,
     simplified: &Simplified,
     settings: &Settings,
     solution: Option<&Solution>,
     stats: &Stats,
-) -> Result<()> {
+) -> Result<Page> {
+    let mut page = Page::default();
     let complete = SimplifiedGeometry::complete(scene, &simplified.surface_of_triangle);
     let params = settings.radiosity_params();
     let patches_complete = radiosity::count_patches(&complete, &[], &params)?;
@@ -157,44 +159,48 @@ fn print_table(
     let dropped = count(&Class::is_isolated);
     let all = simplified.surfaces.len();
     let clusters = &simplified.clusters;
-    println!(
+    page.line(format_args!(
         "{}: r_thresh {:.4}, beta {:.4}, A_thresh {:.5}, patches of {:.4}",
         scene.name,
         settings.r_thresh(),
         settings.beta,
         simplified.a_thresh,
         settings.patch_size.unwrap_or(f32::INFINITY)
-    );
-    println!("                    surfaces   patches  triangles");
-    println!("normal + complex  {all:>10} {patches_complete:>9} {:>10}", complete.triangles.len());
+    ));
+    page.line(format_args!("                    surfaces   patches  triangles"));
+    page.line(format_args!("normal + complex  {all:>10} {patches_complete:>9} {:>10}", complete.triangles.len()));
     let geometry = &simplified.geometry;
-    println!("normal + simple   {:>10} {patches:>9} {:>10}", geometry.surfaces, geometry.triangles.len());
+    page.line(format_args!(
+        "normal + simple   {:>10} {patches:>9} {:>10}",
+        geometry.surfaces,
+        geometry.triangles.len()
+    ));
     let share = |a: usize, b: usize| 100.0 * a as f64 / b.max(1) as f64;
-    println!(
+    page.line(format_args!(
         "                  {:>9.2}% {:>8.2}% {:>9.2}%",
         share(geometry.surfaces as usize, all),
         share(patches, patches_complete),
         share(geometry.triangles.len(), complete.triangles.len())
-    );
-    println!(
+    ));
+    page.line(format_args!(
         "{normal} normal, {} in {} clusters, {dropped} dropped; simplified in {:.2} s ({:.2} of all cores), {} rays",
         all - normal - dropped,
         clusters.len(),
         stats.seconds.simplify,
         stats.cpu_seconds.simplify,
         simplified.rays
-    );
+    ));
     if !clusters.is_empty() {
         let n = clusters.len() as f32;
         let mean =
             |f: &dyn Fn(&crate::simplify::FitResidual) -> f32| clusters.iter().map(|c| f(&c.residual)).sum::<f32>() / n;
-        println!(
+        page.line(format_args!(
             "boxes on fresh rays: mean |intercepted - 1| {:.4}, by direction {:.4}, mean |reflected colour| {:.4}, hidden {:.4}",
             mean(&|r| r.intercepted.abs()),
             mean(&|r| r.directional),
             mean(&|r| r.reflected.abs().element_sum() / 3.0),
             mean(&|r| r.hidden)
-        );
+        ));
     }
-    Ok(())
+    Ok(page)
 }

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 use clap::Args;
 
 use super::options::{LengthOrAuto, SceneOptions, Talk, load, set_threads};
+use super::page::Page;
 use crate::backend::compare::Comparison;
 use crate::error::{Error, Result};
 use crate::pipeline::validate::{Report, validate};
@@ -53,47 +54,55 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         ..Settings::default()
     };
     let report = validate(&scene, &camera, settings, options.rays, &progress)?;
-    print(&scene.name, &report);
+    describe(&scene.name, &report).print()?;
     let good = report.total().unexplained == 0;
     Ok(if good { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-fn print(scene: &str, report: &Report) {
+fn describe(scene: &str, report: &Report) -> Page {
+    let mut page = Page::default();
     let [a, b] = &report.backends;
     let [detailed, simplified] = report.triangles;
-    println!("{scene}: {a} against {b}");
-    println!(
+    page.line(format_args!("{scene}: {a} against {b}"));
+    page.line(format_args!(
         "{detailed} triangles in the detailed scene, {simplified} in the simplified, r_thresh {:.4}",
         report.r_thresh
-    );
-    println!();
-    row("", ["rays", "identical", "misses", "tied", "borderline", "unexplained"].map(str::to_owned));
+    ));
+    page.line("");
+    row(&mut page, "", ["rays", "identical", "misses", "tied", "borderline", "unexplained"].map(str::to_owned));
     let total = report.total();
     let kinds = report.kinds.iter().map(|(kind, comparison)| (kind.name(), comparison));
     for (name, c) in kinds.chain([("total", &total)]) {
-        row(name, [c.rays, c.identical, c.misses, c.tied, c.borderline, c.unexplained].map(|n| n.to_string()));
+        row(
+            &mut page,
+            name,
+            [c.rays, c.identical, c.misses, c.tied, c.borderline, c.unexplained].map(|n| n.to_string()),
+        );
     }
-    println!();
-    println!(
+    page.line("");
+    page.line(format_args!(
         "tied: another triangle at the same distance within the rounding bound; borderline: rounding decides whether"
-    );
-    println!(
+    ));
+    page.line(format_args!(
         "the ray hits at all (outlines, ends of the ray, grazing incidence, alpha); both bounds are worked out per ray."
-    );
+    ));
     for (kind, comparison) in &report.kinds {
-        print_examples(kind.name(), comparison);
+        add_examples(&mut page, kind.name(), comparison);
     }
+    page
 }
 
-fn row(name: &str, cells: [String; 6]) {
+fn row(page: &mut Page, name: &str, cells: [String; 6]) {
     let [rays, identical, misses, tied, borderline, unexplained] = cells;
-    println!("{name:<14}{rays:>10}{identical:>11}{misses:>10}{tied:>9}{borderline:>12}{unexplained:>13}");
+    page.line(format_args!(
+        "{name:<14}{rays:>10}{identical:>11}{misses:>10}{tied:>9}{borderline:>12}{unexplained:>13}"
+    ));
 }
 
-fn print_examples(name: &str, comparison: &Comparison) {
+fn add_examples(page: &mut Page, name: &str, comparison: &Comparison) {
     for difference in comparison.examples.iter().take(SHOWN) {
-        println!("unexplained ({name}): {:?}", difference.ray);
-        println!("  first:  {:?}, occluded {}", difference.a, difference.occluded[0]);
-        println!("  second: {:?}, occluded {}", difference.b, difference.occluded[1]);
+        page.line(format_args!("unexplained ({name}): {:?}", difference.ray));
+        page.line(format_args!("  first:  {:?}, occluded {}", difference.a, difference.occluded[0]));
+        page.line(format_args!("  second: {:?}, occluded {}", difference.b, difference.occluded[1]));
     }
 }

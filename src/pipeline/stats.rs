@@ -6,7 +6,7 @@ use serde_json::{Map, Value};
 use super::cache::Fetched;
 use crate::clock::Stopwatch;
 use crate::radiosity::Solution;
-use crate::render::{Film, Rendering, bias::Bias};
+use crate::render::{Film, IrradianceCache, Rendering, bias::Bias};
 use crate::simplify::{Class, Simplified};
 
 /// The `--stats` file. Keys are stable; new ones may be added.
@@ -121,6 +121,10 @@ pub struct Errors {
     pub lores: f64,
     /// Standard error of the image.
     pub total: f64,
+    /// Error of indirect light by interpolation between places, over the image: noise of the places and what changes between them.
+    pub interpolation: Option<f64>,
+    /// Noise and interpolation together: how far the image's pixels are off, but for bias of the far field.
+    pub image: f64,
     /// Standard error of the radiosity solution.
     pub radiosity: f64,
     /// Mean over clusters of |intercepted flux of the box / of the cluster - 1|.
@@ -192,7 +196,14 @@ impl Stats {
     pub fn record_film(&mut self, film: &Film) {
         let errors = film.relative_errors();
         (self.error.hires, self.error.lores, self.error.total) = (errors.hires, errors.lores, errors.total);
+        self.error.image = errors.total;
         self.counts.dropped_trials = film.tiles.iter().map(|t| t.dropped).sum();
+    }
+
+    /// Records what `film` may be off by interpolation between the places of `cache`.
+    pub fn record_interpolation(&mut self, cache: &IrradianceCache, film: &Film) {
+        self.error.interpolation = cache.error().map(|error| error * film.share_of_lores());
+        self.error.image = self.error.total.hypot(self.error.interpolation.unwrap_or(0.0));
     }
 
     /// Records the bias meter, relative to the radiance of `film`.

@@ -329,6 +329,20 @@ impl Film {
         }
     }
 
+    /// Share of LORES in the image, as a relative error of LORES alone becomes one of the image: root of the mean of
+    /// `LORES^2 / (L^2 + (L_mean / 10)^2)`.
+    pub fn share_of_lores(&self) -> f64 {
+        let mean = self.mean(|p| add(p.hires.mean(), p.lores.mean()));
+        let square = self.mean(|p| {
+            let (lores, total) = (p.lores.mean(), add(p.hires.mean(), p.lores.mean()));
+            std::array::from_fn(|band| {
+                let scale = total[band].powi(2) + 0.01 * mean * mean;
+                if scale > 0.0 { lores[band].powi(2) / scale } else { 0.0 }
+            })
+        });
+        square.sqrt()
+    }
+
     /// Mean over all pixels and bands of a value per pixel.
     pub fn mean(&self, value: impl Fn(&Pixel) -> [f64; 3]) -> f64 {
         let sum: f64 = self.pixels().map(|p| value(p).iter().sum::<f64>()).sum();

@@ -110,10 +110,12 @@ impl SurfacePoint {
 
     /// What the inside of a solid leaves of light that came through it to this point along `distance` and is seen from
     /// `outgoing`: less than one only where that is behind the surface of something that absorbs.
+    #[inline]
     pub fn absorption(&self, scene: &Scene, outgoing: Vec3, distance: f32) -> Vec3 {
-        let material = scene.material(self.triangle);
-        let inside = material.absorbs() && outgoing.dot(self.geometric_normal) < 0.0;
-        if inside { material.left_after(distance) } else { Vec3::ONE }
+        // The side first: it is at hand, the material is not.
+        let behind = outgoing.dot(self.geometric_normal) < 0.0;
+        let material = behind.then(|| scene.material(self.triangle)).filter(|material| material.absorbs());
+        material.map_or(Vec3::ONE, |material| material.left_after(distance))
     }
 
     /// Origin for a ray that leaves into `direction`: moved along the geometric normal to the side of `direction`

@@ -6,6 +6,7 @@
 //! close together next to other surfaces. Where none reaches, paths gather as without a cache.
 
 mod clamp;
+mod error;
 mod flight;
 mod index;
 mod nearby;
@@ -224,21 +225,26 @@ impl IrradianceCache {
         nearby.around(&self.index, &self.records, pixel, position)?.look_up(position, normal)
     }
 
+    /// What the others say about a record's place; `None` where none of those that `ask` names reaches.
+    fn told(&self, own: &Record, ask: impl Fn(&Record) -> bool) -> Option<Vec3> {
+        let (mut sum, mut weights) = (Vec3::ZERO, 0.0);
+        let others = self.around(own.position, own.normal).filter(|(_, other)| !std::ptr::eq(*other, own));
+        for (weight, other) in others.filter(|(_, other)| ask(other)) {
+            sum += weight * other.at(own.position, own.normal);
+            weights += weight;
+        }
+        (weights > 0.0).then(|| sum / weights)
+    }
+
     /// Asks the others what each record measured itself. Records that are told something else refuse.
     fn check(&mut self) {
-        let refuses: Vec<bool> = (0..self.records.len())
-            .into_par_iter()
-            .map(|number| {
-                let own = &self.records[number];
-                let (mut sum, mut weights) = (Vec3::ZERO, 0.0);
-                for (weight, other) in self.around(own.position, own.normal).filter(|(_, o)| !std::ptr::eq(*o, own)) {
-                    sum += weight * other.at(own.position, own.normal);
-                    weights += weight;
-                }
-                let (told, measured) = ((sum / weights).element_sum(), own.radiance.element_sum());
-                weights > 0.0 && (told - measured).abs() > TOLERANCE * told.max(measured)
+        let is_off = |own: &Record| {
+            self.told(own, |_| true).is_some_and(|told| {
+                let (told, measured) = (told.element_sum(), own.radiance.element_sum());
+                (told - measured).abs() > TOLERANCE * told.max(measured)
             })
-            .collect();
+        };
+        let refuses: Vec<bool> = self.records.par_iter().map(is_off).collect();
         for (record, refuses) in self.records.iter_mut().zip(refuses) {
             record.refuses |= refuses;
         }

@@ -76,6 +76,8 @@ pub(super) struct Record {
     pub refuses: bool,
     /// Irradiance over pi: the radiance that a white diffuse surface reflects, W/(sr m^2).
     pub radiance: Vec3,
+    /// Rays that it is the mean of.
+    pub rays: u32,
     /// Variance of what a single ray brings, over the square of its mean, bands together: known where two records were made into one.
     pub variance: Option<f32>,
     /// Change of each band with the normal: scalar product with the axis of rotation times its sine.
@@ -154,6 +156,7 @@ impl Record {
             least_reach,
             refuses: false,
             radiance: mean,
+            rays: rays as u32,
             variance: None,
             by_rotation,
             by_translation,
@@ -171,11 +174,17 @@ impl Record {
             distance: 2.0 / (1.0 / self.distance + 1.0 / other.distance),
             radiance: half(self.radiance, other.radiance),
             // Of the mean of two it is (difference / sum)^2.
+            rays: self.rays + other.rays,
             variance: (sum > 0.0).then(|| (difference / sum).powi(2) * 2.0 * rays as f32),
             by_rotation: halves(self.by_rotation, other.by_rotation),
             by_translation: halves(self.by_translation, other.by_translation),
             ..*self
         }
+    }
+
+    /// Relative variance of its light, bands together, where it is known.
+    pub fn noise(&self) -> Option<f64> {
+        self.variance.map(|variance| f64::from(variance) / f64::from(self.rays))
     }
 
     /// Whether all numbers in it are possible.
