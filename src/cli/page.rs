@@ -19,7 +19,7 @@ impl Page {
     /// Prints all lines.
     ///
     /// # Errors
-    /// As [`print`].
+    /// As [`print()`].
     pub fn print(&self) -> Result<()> {
         print(self.0.as_bytes())
     }
