@@ -306,7 +306,7 @@ impl Options {
         if let Some(kept) = kept.filter(|_| !rendering.stopped) {
             kept.remove()?;
         }
-        self.summarise(&view.outputs, stats, rendering.stopped.then_some(advice.as_str()));
+        self.summarise(&view.outputs, params, stats, rendering.stopped.then_some(advice.as_str()));
         self.say_what_is_missing(&rendering, params, stats);
         Ok(true)
     }
@@ -437,7 +437,7 @@ impl Options {
     }
 
     /// `stopped` says what can be done about it.
-    fn summarise(&self, outputs: &[PathBuf], stats: &Stats, stopped: Option<&str>) {
+    fn summarise(&self, outputs: &[PathBuf], params: &RenderParams, stats: &Stats, stopped: Option<&str>) {
         let s = &stats.seconds;
         let e = &stats.error;
         self.talk.say(format!(
@@ -453,7 +453,7 @@ impl Options {
             s.lores,
             s.bias
         ));
-        let mut errors = if self.spp == Some(1) {
+        let mut errors = if params.max_trials == 1 {
             "noise not known from one trial a pixel".to_owned()
         } else {
             format!("noise {:.2} % (HIRES {:.2}, LORES {:.2})", 100.0 * e.total, 100.0 * e.hires, 100.0 * e.lores)

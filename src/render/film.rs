@@ -318,7 +318,7 @@ impl Film {
     /// Relative standard error of each pass over the whole image, and of their sum: root of the mean squared error over
     /// the mean of `L^2 + (L_mean / 10)^2`, both measured from the two independent halves of all trials.
     pub fn relative_errors(&self) -> ImageErrors {
-        let mean = self.mean(|p| add(p.hires.mean(), p.lores.mean()));
+        let mean = self.mean_radiance();
         ImageErrors {
             hires: self.relative_error(mean, |p| p.hires.halves()),
             lores: self.relative_error(mean, |p| p.lores.halves()),
@@ -332,15 +332,20 @@ impl Film {
     /// Share of LORES in the image, as a relative error of LORES alone becomes one of the image: root of the mean of
     /// `LORES^2 / (L^2 + (L_mean / 10)^2)`.
     pub fn share_of_lores(&self) -> f64 {
-        let mean = self.mean(|p| add(p.hires.mean(), p.lores.mean()));
+        let mean = self.mean_radiance();
         let square = self.mean(|p| {
             let (lores, total) = (p.lores.mean(), add(p.hires.mean(), p.lores.mean()));
             std::array::from_fn(|band| {
-                let scale = total[band].powi(2) + 0.01 * mean * mean;
+                let scale = scale(total[band], mean);
                 if scale > 0.0 { lores[band].powi(2) / scale } else { 0.0 }
             })
         });
         square.sqrt()
+    }
+
+    /// Mean radiance over all pixels and bands.
+    fn mean_radiance(&self) -> f64 {
+        self.mean(|p| add(p.hires.mean(), p.lores.mean()))
     }
 
     /// Mean over all pixels and bands of a value per pixel.
@@ -358,7 +363,7 @@ impl Film {
             for band in 0..3 {
                 // Var[(a+b)/2] = E[(a-b)^2] / 4 for independent halves of equal size.
                 let squared = 0.25 * (a[band] - b[band]).powi(2);
-                let scale = total[band].powi(2) + 0.01 * mean * mean;
+                let scale = scale(total[band], mean);
                 if scale > 0.0 {
                     sum += squared / scale;
                 }
@@ -367,6 +372,11 @@ impl Film {
         }
         (sum / (count.max(1) as f64)).sqrt()
     }
+}
+
+/// Denominator of a relative squared error: the radiance squared, and for dark pixels a part of the image's mean.
+fn scale(radiance: f64, mean: f64) -> f64 {
+    radiance.powi(2) + 0.01 * mean * mean
 }
 
 /// Relative standard errors of an image, 0..; see [`Film::relative_errors`].

@@ -21,6 +21,11 @@ pub fn rounded(plane: &Plane) -> Vec<Vec3> {
     plane.iter().map(|v| DVec3::from(*v).as_vec3()).collect()
 }
 
+/// What `all` has more than `part`.
+pub fn difference(all: &Plane, part: &Plane) -> Plane {
+    all.iter().zip(part).map(|(a, p)| std::array::from_fn(|c| a[c] - p[c])).collect()
+}
+
 /// Two independent estimates of the same radiance.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Halves(pub [Plane; 2]);
@@ -76,10 +81,7 @@ impl Picture {
 
     /// HIRES alone.
     pub fn direct(&self) -> Halves {
-        let less = |(whole, lores): (&Plane, &Plane)| -> Plane {
-            whole.iter().zip(lores).map(|(w, l)| std::array::from_fn(|c| w[c] - l[c])).collect()
-        };
-        Halves(std::array::from_fn(|k| less((&self.whole.0[k], &self.indirect.0[k]))))
+        Halves(std::array::from_fn(|k| difference(&self.whole.0[k], &self.indirect.0[k])))
     }
 
     /// Channels `R,G,B` and the layer `lores`, means of both halves.

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use base64::Engine;
 use serde_json::json;
 
+use super::error::difference;
 use super::page::{self, Figure};
 use super::plan::Role;
 use super::plot::{self, Bar, Bars, Chart, Line};
@@ -213,14 +214,8 @@ impl<'a> Album<'a> {
 
     fn direct(&self, run: &Record, point: &Point) -> Result<Figure> {
         let [whole, indirect] = pictures::read(&self.study.store.image(&run.key, point.trials))?;
-        let direct: super::error::Plane =
-            whole.iter().zip(&indirect).map(|(w, l)| std::array::from_fn(|c| w[c] - l[c])).collect();
-        let truth: super::error::Plane = self
-            .reference
-            .iter()
-            .zip(&self.chapter.reference.picture.indirect.mean())
-            .map(|(w, l)| std::array::from_fn(|c| w[c] - l[c]))
-            .collect();
+        let direct = difference(&whole, &indirect);
+        let truth = difference(&self.reference, &self.chapter.reference.picture.indirect.mean());
         let path = self.path("direct-difference");
         pictures::difference(&path, self.width(), &direct, &truth)?;
         Ok(Figure {

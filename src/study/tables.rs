@@ -244,16 +244,14 @@ fn prices(chapters: &[Chapter<'_>]) -> Table {
         "prices",
         "Global light at the price of direct light",
         "Core seconds of GSII until direct light (HIRES) has 2 % relative error (root of relMSE of that light alone), and until indirect light has \
-         (simplification, radiosity and LORES; bias included). Bias: of the whole image's mean, with its standard error.",
+         (simplification, radiosity and LORES; bias included). Bias: of the whole image's mean, with its 95 % interval.",
         &["Scene", "Direct", "Indirect", "Indirect / direct", "Bias"],
     );
     for chapter in chapters {
         let Some([direct, indirect]) = price(chapter) else { continue };
         let ratio = direct.seconds().zip(indirect.seconds()).map(|(d, i)| number(i / d));
-        let bias = chapter
-            .run(Role::Gsii)
-            .and_then(|r| r.last()?.whole)
-            .map(|e| format!("{:+.2} \u{b1} {:.2} %", 100.0 * e.relative_bias, 100.0 * e.relative_bias_error));
+        let errors = chapter.run(Role::Gsii).and_then(|r| r.last()?.whole);
+        let bias = errors.map(|e| signed_percent(e.relative_bias, e.relative_bias_error));
         table.push(vec![chapter.name.to_owned(), direct.text(), indirect.text(), or_dash(ratio), or_dash(bias)]);
     }
     table

@@ -1,6 +1,7 @@
 //! The outermost layer of a glTF file: GLB chunks, or plain JSON.
 
 use std::borrow::Cow;
+use std::path::Path;
 
 /// The two things that a file holds.
 pub(super) struct Container {
@@ -19,6 +20,14 @@ fn u32_at(bytes: &[u8], at: usize) -> Option<u32> {
 }
 
 impl Container {
+    /// Reads a file.
+    pub(super) fn open(path: &Path) -> Result<Container, String> {
+        if path.is_dir() {
+            return Err("this is a folder; the scene is a .glb or .gltf file in it".to_owned());
+        }
+        Self::read(std::fs::read(path).map_err(|e| format!("cannot read the file: {e}"))?)
+    }
+
     /// Splits `bytes`; a GLB is known by its first four bytes, not by the file's name.
     pub(super) fn read(bytes: Vec<u8>) -> Result<Container, String> {
         if bytes.is_empty() {

@@ -57,11 +57,7 @@ pub struct LoadOptions {
 /// [`Error::Input`] when the file cannot be read, is broken, needs an unsupported extension, or holds nothing to render.
 pub fn load(path: &Path, options: &LoadOptions) -> crate::error::Result<Scene> {
     let fail = |reason: String| Error::Input { path: PathBuf::from(path), reason };
-    if path.is_dir() {
-        return Err(fail("this is a folder; the scene is a .glb or .gltf file in it".to_owned()));
-    }
-    let bytes = std::fs::read(path).map_err(|e| fail(format!("cannot read the file: {e}")))?;
-    let container = Container::read(bytes).map_err(fail)?;
+    let container = Container::open(path).map_err(fail)?;
     let document = Document::parse(&container.json).map_err(fail)?;
     let root = &document.root;
     let buffers = Buffers::new(root, path, container.bin.as_deref());

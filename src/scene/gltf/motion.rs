@@ -32,8 +32,7 @@ impl Motion {
     /// When the file cannot be read or an animation is broken.
     pub fn read(path: &Path) -> Result<Motion> {
         let fail = |reason: String| Error::Input { path: path.to_owned(), reason };
-        let bytes = std::fs::read(path).map_err(|e| fail(format!("cannot read the file: {e}")))?;
-        let container = Container::read(bytes).map_err(fail)?;
+        let container = Container::open(path).map_err(fail)?;
         let document = Document::parse(&container.json).map_err(fail)?;
         let buffers = Buffers::new(&document.root, path, container.bin.as_deref());
         let (tracks, _) = Tracks::read(&document.root, &buffers).map_err(fail)?;
