@@ -21,7 +21,7 @@ use gsii::scene::Camera;
 use gsii::scene::gltf::{LoadOptions, load};
 
 /// Runs of each kind; the median ratio is printed.
-const RUNS: usize = 5;
+const RUNS: usize = 15;
 
 /// Pixels of the picture.
 const SIZE: [u32; 2] = [160, 90];

@@ -6,16 +6,98 @@ use std::sync::LazyLock;
 use glam::{Vec2, Vec3};
 use sobol_burley::parts::{self, Int4};
 
-/// Owen-scrambled Sobol points, four dimensions at a time, with values in 0..1.
-///
-/// `stream` keeps unrelated uses (pixels, patches, clusters) apart; `index` is the sample's number: among the first 65536
-/// every prefix of a power of two is well distributed; later points belong to further scramblings. `dimension` numbers blocks
-/// of four; beyond 64 of them (long paths) blocks repeat under another scrambling.
+/// Blocks of four dimensions that a point has before they repeat.
+const BLOCKS: u32 = sobol_burley::NUM_DIMENSION_SETS_4D;
+
+/// Points of one scrambling.
+const INDICES: u32 = 1 << 16;
+
+/// A point of an Owen-scrambled Sobol sequence: as many dimensions as wanted, four at a time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SobolPoint {
+    /// Place in the sequence, bits reversed.
+    place: u32,
+    seed: u32,
+}
+
+impl SobolPoint {
+    /// `stream` keeps unrelated uses (pixels, patches, clusters) apart; `index` is the sample's number: among the first 65536 every
+    /// prefix of a power of two is well distributed; later points belong to further scramblings.
+    #[inline]
+    pub fn new(index: u32, stream: u32) -> Self {
+        let seed = hash(stream ^ (index / INDICES).wrapping_mul(0x9e37_79b9));
+        SobolPoint { place: shuffled((index % INDICES).reverse_bits(), seed), seed }
+    }
+
+    /// The point with the same number in another scrambling, independent of this one.
+    pub fn elsewhere(self, key: u32) -> Self {
+        let seed = hash_all(&[self.seed, key]);
+        SobolPoint { place: shuffled(self.place, seed), seed }
+    }
+
+    /// Four numbers in 0..1. `dimension` numbers blocks of four; beyond 64 of them (long paths) blocks repeat under another scrambling.
+    #[inline]
+    pub fn block(self, dimension: u32) -> [f32; 4] {
+        if dimension >= BLOCKS {
+            return self.elsewhere(dimension / BLOCKS).block(dimension % BLOCKS);
+        }
+        scrambled(dimension, self.place, scrambles(dimension, self.seed))
+    }
+}
+
+/// Points of one stream in a row: what they have in common is worked out once.
+#[derive(Clone, Copy, Debug)]
+pub struct SobolStream {
+    stream: u32,
+    seed: u32,
+    /// Of the first block.
+    scrambles: Int4,
+}
+
+impl SobolStream {
+    /// See [`SobolPoint::new`].
+    pub fn new(stream: u32) -> Self {
+        let seed = hash(stream);
+        SobolStream { stream, seed, scrambles: scrambles(0, seed) }
+    }
+
+    /// [`SobolPoint::new`], and its first block of numbers.
+    #[inline]
+    pub fn point(&self, index: u32) -> (SobolPoint, [f32; 4]) {
+        if index >= INDICES {
+            let point = SobolPoint::new(index, self.stream);
+            return (point, point.block(0));
+        }
+        let place = shuffled(index.reverse_bits(), self.seed);
+        (SobolPoint { place, seed: self.seed }, scrambled(0, place, self.scrambles))
+    }
+}
+
+/// What a block of dimensions is scrambled with.
+#[inline]
+fn scrambles(dimension: u32, seed: u32) -> Int4 {
+    let seed = seed.wrapping_mul(0x9c8f_2d3b) ^ dimension;
+    parts::hash_int4([LANES[0] ^ seed, LANES[1] ^ seed, LANES[2] ^ seed, LANES[3] ^ seed].into())
+}
+
+/// A block of dimensions of the point at a place of the sequence.
+#[inline]
+fn scrambled(dimension: u32, place: u32, scrambles: Int4) -> [f32; 4] {
+    let quarters = &QUARTERS[dimension as usize];
+    let of = |quarter: usize| quarters[quarter][(place >> (28 - 4 * quarter)) as usize & 15];
+    let point = (of(0) ^ of(1)) ^ (of(2) ^ of(3));
+    parts::owen_scramble_int4_rev(point, scrambles).reverse_bits().to_f32_norm()
+}
+
+/// Four numbers of one point: see [`SobolPoint`].
 pub fn sobol(index: u32, dimension: u32, stream: u32) -> [f32; 4] {
-    const BLOCKS: u32 = sobol_burley::NUM_DIMENSION_SETS_4D;
-    const INDICES: u32 = 1 << 16;
-    let wrapped = (index / INDICES).wrapping_mul(0x9e37_79b9) ^ (dimension / BLOCKS).wrapping_mul(0x85eb_ca6b);
-    sample_4d(index % INDICES, dimension % BLOCKS, hash(stream ^ wrapped))
+    SobolPoint::new(index, stream).block(dimension)
+}
+
+/// A place in the sequence under the scrambling of `seed`; bits reversed.
+#[inline]
+fn shuffled(place: u32, seed: u32) -> u32 {
+    parts::owen_scramble_rev(place, parts::hash(seed ^ 0x79c6_8e4a))
 }
 
 /// Scrambles of the four dimensions of a block.
@@ -27,19 +109,8 @@ static QUARTERS: LazyLock<Vec<[[Int4; 16]; 4]>> = LazyLock::new(|| {
     let point = |block: u32, quarter: u32, value: u32| parts::sobol_int4_rev(value << (28 - 4 * quarter), block);
     let quarter = |block: u32, quarter: u32| std::array::from_fn(|value| point(block, quarter, value as u32));
     let block = |block: u32| std::array::from_fn(|q| quarter(block, q as u32));
-    (0..sobol_burley::NUM_DIMENSION_SETS_4D).map(block).collect()
+    (0..BLOCKS).map(block).collect()
 });
-
-/// The same as [`sobol_burley::sample_4d`], bit for bit, without going through the bits of the index one by one.
-fn sample_4d(index: u32, block: u32, seed: u32) -> [f32; 4] {
-    let shuffled = parts::owen_scramble_rev(index.reverse_bits(), parts::hash(seed ^ 0x79c6_8e4a));
-    let quarters = &QUARTERS[block as usize];
-    let of = |quarter: usize| quarters[quarter][(shuffled >> (28 - 4 * quarter)) as usize & 15];
-    let point = (of(0) ^ of(1)) ^ (of(2) ^ of(3));
-    let seed = seed.wrapping_mul(0x9c8f_2d3b) ^ block;
-    let scrambles = parts::hash_int4(LANES.map(|lane| lane ^ seed).into());
-    parts::owen_scramble_int4_rev(point, scrambles).reverse_bits().to_f32_norm()
-}
 
 /// A good 32-bit hash (Ettinger's two-round mixer).
 pub fn hash(mut x: u32) -> u32 {
@@ -117,8 +188,29 @@ mod tests {
     fn points_are_those_of_the_library() {
         for i in 0..4096 {
             let index = hash(i) >> if i < 2048 { 16 } else { 24 };
-            let (block, seed) = (hash(i ^ 7) % sobol_burley::NUM_DIMENSION_SETS_4D, hash(i ^ 9));
-            assert_eq!(sample_4d(index, block, seed), sobol_burley::sample_4d(index, block, seed));
+            let (block, stream) = (hash(i ^ 7) % BLOCKS, hash(i ^ 9));
+            assert_eq!(sobol(index, block, stream), sobol_burley::sample_4d(index, block, hash(stream)));
+            let index = if i % 2 == 0 { index } else { hash(i) };
+            let point = SobolPoint::new(index, stream);
+            assert_eq!(SobolStream::new(stream).point(index), (point, point.block(0)));
+        }
+    }
+
+    /// Each of 256 points in a strip of its own in every dimension, before and after; and not the same ones.
+    #[test]
+    fn other_scramblings_are_as_well_distributed() {
+        let points: Vec<SobolPoint> = (0..256).map(|i| SobolPoint::new(i, 5)).collect();
+        let others: Vec<SobolPoint> = points.iter().map(|p| p.elsewhere(3)).collect();
+        for dimension in [0, 7, 63, 64, 200] {
+            for lane in 0..4 {
+                let strips = |of: &[SobolPoint]| of.iter().map(|p| (256.0 * p.block(dimension)[lane]) as u32).collect();
+                let [own, other]: [Vec<u32>; 2] = [&points, &others].map(|p| strips(p));
+                assert_ne!(own, other);
+                for mut strips in [own, other] {
+                    strips.sort_unstable();
+                    assert!(strips.iter().copied().eq(0..256), "{dimension} {lane}");
+                }
+            }
         }
     }
 }

@@ -23,15 +23,12 @@ use crate::progress::Progress;
 use crate::render::checkpoint::LateIdentity;
 use crate::render::film::Pixel;
 use crate::render::layers::{Layer, develop};
-use crate::render::{Region, RenderParams, Rendering, Session, World, bias};
+use crate::render::{LEAST_TRIALS, Region, RenderParams, Rendering, Session, WORST_PIXEL, World, bias};
 use crate::scene::{Camera, Scene};
 use crate::unfinished;
 
 /// Relative error of an image that is aimed at where nothing else is asked for.
 const ERROR: f32 = 0.03;
-
-/// How much larger the error of single pixels may be than that of the image: what is left of noise is grain, not specks.
-const WORST_PIXEL: f32 = 4.0;
 
 /// An error is missed when it is so many times what was asked for: it is itself known to some per cent.
 const MISSED: f64 = 1.1;
@@ -96,7 +93,7 @@ pub struct Options {
     #[arg(long, value_name = "X", help_heading = "Quality")]
     lores_error: Option<f32>,
     /// Fewest trials of a pixel in each pass
-    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..), help_heading = "Quality")]
+    #[arg(long, value_name = "N", default_value_t = LEAST_TRIALS, value_parser = clap::value_parser!(u32).range(1..), help_heading = "Quality")]
     min_trials: u32,
     /// Most trials of a pixel in each pass
     #[arg(long, value_name = "N", default_value_t = 512, value_parser = clap::value_parser!(u32).range(1..), help_heading = "Quality")]

@@ -53,8 +53,7 @@ pub(super) struct AreaLight {
     area: f64,
     /// The triangle, or both of a rectangle (the second `Hit::NONE` for a triangle).
     pub triangles: [u32; 2],
-    /// The edges and their cross product in single precision, for points of view that are far enough.
-    rough: [Vec3; 3],
+    rough: Rough,
     /// What only rectangles have.
     rectangle: Option<RectangleFrame>,
     /// Mean emitted radiance.
@@ -63,6 +62,51 @@ pub(super) struct AreaLight {
     varies: bool,
     /// Whether the clockwise side emits, too.
     pub both_faces: bool,
+}
+
+/// All that points of view need that are far enough, in single precision.
+#[derive(Clone, Copy, Debug)]
+struct Rough {
+    corner: Vec3,
+    edges: [Vec3; 2],
+    cross: Vec3,
+    centre: Vec3,
+    /// Squared distances from the centre between which this is enough; none for triangles.
+    distance_squared: [f32; 2],
+    /// Least value of [`AreaLight::view`]'s `side` that tells on which side of the plane a point is: at a distance of zero, and its growth over
+    /// the square of the distance.
+    sharp: [f32; 2],
+}
+
+impl Rough {
+    fn new(corner: DVec3, [e, f]: [DVec3; 2], centre: DVec3, radius: f64, rectangle: bool) -> Self {
+        let cross = e.cross(f);
+        // Coordinates of light and point are rounded by half a unit each, those of the latter no larger than the light's and their
+        // distance d; ten more roundings follow. d < d^2 / r where this is used.
+        let rounding = 16.0 * f64::from(f32::EPSILON) * cross.length();
+        let reach = corner.abs().max((corner + e).abs()).max((corner + f).abs()).max((corner + e + f).abs());
+        let squares = if rectangle { [BILINEAR_SQUARED, FAR_SQUARED].map(|d2| d2 * radius * radius) } else { [0.0; 2] };
+        Rough {
+            corner: corner.as_vec3(),
+            edges: [e.as_vec3(), f.as_vec3()],
+            cross: cross.as_vec3(),
+            centre: centre.as_vec3(),
+            distance_squared: [1.0001 * squares[0], 0.9999 * squares[1]].map(|d2| d2 as f32),
+            sharp: [rounding * reach.length(), rounding / radius].map(|s| s as f32),
+        }
+    }
+
+    /// The rectangle as seen from a point that is neither close nor afar nor near its plane.
+    #[inline(always)]
+    fn seen(&self, position: Vec3, normal: Vec3, both_faces: bool) -> Option<SeenRectangle> {
+        let corner = self.corner - position;
+        let d2 = (self.centre - position).length_squared();
+        let side = -corner.dot(self.cross);
+        let side = if both_faces { side.abs() } else { side };
+        let [least, most] = self.distance_squared;
+        let usable = d2 > least && d2 < most && side > self.sharp[0] + self.sharp[1] * d2;
+        usable.then_some(SeenRectangle { corner, edges: self.edges, cross: self.cross, normal })
+    }
 }
 
 /// What is known of a rectangle before it is seen from anywhere.
@@ -168,7 +212,14 @@ impl AreaLight {
     /// How points on it are chosen for `position` on a surface with unit `normal` (zero: from all around). `None` from the dark
     /// side and from edge-on.
     #[inline(always)]
-    pub(super) fn view(&self, position: DVec3, normal: Vec3) -> Option<View> {
+    pub(super) fn view(&self, position: Vec3, normal: Vec3) -> Option<View> {
+        match self.rough.seen(position, normal, self.both_faces) {
+            Some(seen) => Some(View::Bilinear(seen)),
+            None => self.view_exactly(position.as_dvec3(), normal),
+        }
+    }
+
+    fn view_exactly(&self, position: DVec3, normal: Vec3) -> Option<View> {
         let corner = self.corner - position;
         let side = -corner.dot(self.cross);
         if !(side > 0.0 || (side < 0.0 && self.both_faces)) {
@@ -179,8 +230,8 @@ impl AreaLight {
             View::Area
         } else if self.is_rectangle() && d2 > BILINEAR_SQUARED * r2 {
             // From that far away f32 is as good as the position is
-            let [e, f, cross] = self.rough;
-            View::Bilinear(SeenRectangle { corner: corner.as_vec3(), edges: [e, f], cross, normal })
+            let Rough { edges, cross, .. } = self.rough;
+            View::Bilinear(SeenRectangle { corner: corner.as_vec3(), edges, cross, normal })
         } else if side.abs() > self.rounding() {
             View::SolidAngle(side)
         } else {
@@ -211,9 +262,11 @@ impl AreaLight {
     }
 
     /// Density per solid angle with which [`AreaLight::sample`] chooses the point at `offset` from `position`.
-    pub(super) fn density(&self, position: DVec3, normal: Vec3, offset: DVec3) -> f64 {
+    pub(super) fn density(&self, position: Vec3, normal: Vec3, offset: DVec3) -> f64 {
         let by_area = || self.area_density(offset).unwrap_or(0.0);
-        match self.view(position, normal) {
+        let view = self.view(position, normal);
+        let position = position.as_dvec3();
+        match view {
             None => 0.0,
             Some(View::Area) => by_area(),
             Some(View::Bilinear(seen)) => {
@@ -299,9 +352,13 @@ impl AreaLight {
         let Some(frame) = &self.rectangle else {
             return (self.triangles[0], Vec2::new(s as f32, t as f32));
         };
-        // Weights of the right-angled corner and, counter-clockwise, of the other two
-        let half = usize::from(s + t > 1.0);
-        let weights = if half == 0 { [1.0 - s - t, s, t] } else { [s + t - 1.0, 1.0 - s, 1.0 - t] };
+        // Weights of the right-angled corner and, counter-clockwise, of the other two; the second half is the first, turned. Without a
+        // branch that would go either way every other time
+        let second = s + t > 1.0;
+        let half = usize::from(second);
+        let turned = |x: f64| if second { 1.0 - x } else { x };
+        let (s, t) = (turned(s), turned(t));
+        let weights = [1.0 - s - t, s, t];
         let right = usize::from(frame.right_corner[half]);
         let weight = |vertex: usize| weights[(vertex + 3 - right) % 3] as f32;
         (self.triangles[half], Vec2::new(weight(1), weight(2)))
@@ -386,7 +443,7 @@ fn triangle_light(scene: &Scene, triangle: u32) -> Option<AreaLight> {
         corner: a,
         edges,
         cross,
-        rough: rough(edges, cross),
+        rough: Rough::new(a, edges, centre, radius, false),
         centre,
         radius,
         area,
@@ -396,10 +453,6 @@ fn triangle_light(scene: &Scene, triangle: u32) -> Option<AreaLight> {
         varies: varies(material),
         both_faces: material.double_sided,
     })
-}
-
-fn rough([e, f]: [DVec3; 2], cross: DVec3) -> [Vec3; 3] {
-    [e, f, cross].map(DVec3::as_vec3)
 }
 
 /// Whether emission or presence differ from point to point.
@@ -517,13 +570,14 @@ fn rectangle_light(scene: &Scene, first: &AreaLight, second: &AreaLight, right_c
     let lengths = edges.map(DVec3::length);
     let x = edges[0] / lengths[0];
     let normal = cross.normalize();
+    let (centre, radius) = (0.5 * (b + c), 0.5 * b.distance(c));
     AreaLight {
         corner: a,
         edges,
         cross,
-        rough: rough(edges, cross),
-        centre: 0.5 * (b + c),
-        radius: 0.5 * b.distance(c),
+        rough: Rough::new(a, edges, centre, radius, true),
+        centre,
+        radius,
         area: cross.length(),
         triangles: [first.triangles[0], second.triangles[0]],
         rectangle: Some(RectangleFrame { x, y: normal.cross(x), normal, lengths, right_corner }),

@@ -6,6 +6,7 @@ use std::f32::consts::{FRAC_PI_2, PI};
 
 use glam::Vec3;
 
+use super::Lit;
 use crate::scene::Aabb;
 
 /// Widening of cones around several lights, in the cosine: the sine of an angle whose cosine is 1 to rounding is only known
@@ -153,6 +154,9 @@ impl Emitter {
 /// Number of emitters whose importance is estimated together.
 pub(super) const LANES: usize = 8;
 
+/// What each of eight emitters may bring to a point.
+pub(super) type Importance = [f32; LANES];
+
 /// Eight emitters side by side, each quantity an array over them: compilers turn the loop over lanes into vector instructions.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(32))]
@@ -211,7 +215,7 @@ impl Emitters {
     ///
     /// Over the sphere of a light whose radius appears under the angle b, cosines differ from the centre's by at most
     /// `w = sin b + sin^2 b`; what counts is the mean of their positive parts, as if they were spread evenly.
-    pub(super) fn importance(&self, position: Vec3, normal: Vec3) -> [f32; LANES] {
+    pub(super) fn importance(&self, position: Vec3, normal: Vec3) -> Importance {
         if self.cones {
             self.importance_of::<true>(position, normal)
         } else {
@@ -219,8 +223,18 @@ impl Emitters {
         }
     }
 
+    /// The same at many points: processors work on several at a time.
+    pub(super) fn importance_at(&self, lit: &[Lit], importance: &mut [Importance]) {
+        if self.cones {
+            importance.iter_mut().zip(lit).for_each(|(i, l)| *i = self.importance_of::<true>(l.position, l.normal));
+        } else {
+            importance.iter_mut().zip(lit).for_each(|(i, l)| *i = self.importance_of::<false>(l.position, l.normal));
+        }
+    }
+
     /// `CONES`: whether any lane emits within a cone around more directions than one.
-    fn importance_of<const CONES: bool>(&self, position: Vec3, normal: Vec3) -> [f32; LANES] {
+    #[inline(always)]
+    fn importance_of<const CONES: bool>(&self, position: Vec3, normal: Vec3) -> Importance {
         let mut importance = [0.0; LANES];
         let any_side = f32::from(u8::from(normal == Vec3::ZERO));
         for (i, value) in importance.iter_mut().enumerate() {

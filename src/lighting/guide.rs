@@ -15,6 +15,9 @@ const SIDE: usize = 8;
 
 const CELLS: usize = SIDE * SIDE * SIDE;
 
+/// Stands for the cell of numbers that no guide was asked for.
+const NO_CELL: u32 = u32::MAX;
+
 /// Share of samples that are spread evenly whatever was found: what is rare may not have been found yet.
 const EVEN: f32 = 0.2;
 
@@ -32,14 +35,14 @@ pub struct Guided {
     pub u: [f32; 3],
     /// What the sample is to be multiplied with: one over the density.
     pub factor: f32,
-    /// The cell they are in, for [`LightGuide::found`]; `None` without a guide.
-    cell: Option<u16>,
+    /// The cell they are in, for [`LightGuide::found`]; [`NO_CELL`] without a guide.
+    cell: u32,
 }
 
 impl Guided {
     /// Numbers as they are.
     pub fn plain(u: [f32; 3]) -> Self {
-        Guided { u, factor: 1.0, cell: None }
+        Guided { u, factor: 1.0, cell: NO_CELL }
     }
 }
 
@@ -76,7 +79,7 @@ impl LightGuide {
         let [a, b, c] = mapped.u.map(place);
         let cell = (a * SIDE + b) * SIDE + c;
         self.counts[cell] += 1.0;
-        Guided { cell: Some(cell as u16), ..mapped }
+        Guided { cell: cell as u32, ..mapped }
     }
 
     fn map(&self, u: [f32; 3]) -> Guided {
@@ -90,13 +93,13 @@ impl LightGuide {
         let (c, uc, pc) = find(&cells[(a * SIDE + b) * SIDE..], u[2]);
         let within = |step: usize, rest: f32| ((step as f32 + rest) / SIDE as f32).min(1.0 - 0.5 * f32::EPSILON);
         let u = [within(a, ua), within(b, ub), within(c, uc)];
-        Guided { u, factor: 1.0 / (pa * pb * pc * CELLS as f32), cell: None }
+        Guided { u, factor: 1.0 / (pa * pb * pc * CELLS as f32), cell: NO_CELL }
     }
 
     /// A sample brought something: `value`, without the factor of [`Guided`].
     pub fn found(&mut self, guided: &Guided, value: Vec3) {
-        if let Some(cell) = guided.cell {
-            for (sum, value) in self.sums[usize::from(cell)].iter_mut().zip(value.to_array()) {
+        if let Some(sums) = self.sums.get_mut(guided.cell as usize) {
+            for (sum, value) in sums.iter_mut().zip(value.to_array()) {
                 *sum += value * value;
             }
         }

@@ -25,11 +25,14 @@ use crate::sampling::{hash_all, unit};
 use crate::scene::{Aabb, LightKind, PunctualLight, Scene};
 use area::{AreaLight, AreaLights, Seen, View};
 use bilinear::Rectangles;
-use bounds::{Bounds, Cone, Emitter};
+use bounds::{Bounds, Cone, Emitter, Importance};
 use emission::FluxTable;
 pub use emission::{EmittedRay, EmittingTriangle};
 use environment::EnvironmentLight;
 use tree::{Leaf, LightTree};
+
+/// Points whose choice of a light begins together.
+const WEIGHED_AT_ONCE: usize = 64;
 
 /// A sampled light source, seen from a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -128,7 +131,7 @@ impl Lights {
 
     /// Samples a light for one point. `None` when nothing can arrive from the chosen light.
     pub fn sample(&self, scene: &Scene, lit: &Lit) -> Option<LightSample> {
-        match self.choose(lit)? {
+        match self.choose(lit, &self.weigh(lit))? {
             Choice::Sampled(sample) => Some(sample),
             Choice::Area { light, probability, view } => {
                 let seen = light.sample(lit.position.as_dvec3(), &view, [lit.u[1], lit.u[2]])?;
@@ -143,9 +146,14 @@ impl Lights {
         samples.resize(lit.len(), None);
         let mut rectangles = Rectangles::default();
         let mut waiting: Vec<(usize, &AreaLight, f64)> = Vec::with_capacity(bilinear::LANES);
+        let mut at_root = [Importance::default(); WEIGHED_AT_ONCE];
         for (i, point) in lit.iter().enumerate() {
+            let place = i % WEIGHED_AT_ONCE;
+            if place == 0 {
+                self.tree.weigh(&lit[i..], &mut at_root);
+            }
             let u = [point.u[1], point.u[2]];
-            match self.choose(point) {
+            match self.choose(point, &at_root[place]) {
                 None => {}
                 Some(Choice::Sampled(sample)) => samples[i] = Some(sample),
                 Some(Choice::Area { light, probability, view: View::Bilinear(seen) }) => {
@@ -166,12 +174,18 @@ impl Lights {
         }
     }
 
-    /// Which light a point asks, and for lights without area what arrives from there.
+    fn weigh(&self, lit: &Lit) -> Importance {
+        let mut at_root = [Importance::default()];
+        self.tree.weigh(std::slice::from_ref(lit), &mut at_root);
+        at_root[0]
+    }
+
+    /// Which light a point asks whose importance is `at_root` of the tree, and for lights without area what arrives from there.
     #[inline(always)]
-    fn choose(&self, lit: &Lit) -> Option<Choice<'_>> {
+    fn choose(&self, lit: &Lit, at_root: &Importance) -> Option<Choice<'_>> {
         let &Lit { position, normal, u } = lit;
-        let choice = refined(u[0], [u[1], u[2]]);
-        let kinds = self.kinds(position, normal)?;
+        let choice = if self.tree.is_small() { f64::from(u[0]) } else { refined(u[0], [u[1], u[2]]) };
+        let kinds = self.kinds(at_root, normal)?;
         let within = |below: f64, share: f64| ((choice - below) / share).clamp(0.0, 1.0 - f64::EPSILON);
         if choice >= kinds.finite + kinds.directional {
             let choice = within(kinds.finite + kinds.directional, kinds.environment);
@@ -182,11 +196,11 @@ impl Lights {
             let sample = self.sample_directional(normal, within(kinds.finite, kinds.directional), kinds.directional);
             return sample.map(Choice::Sampled);
         }
-        let (light, probability) = self.tree.sample(position, normal, within(0.0, kinds.finite))?;
+        let (light, probability) = self.tree.sample(at_root, position, normal, within(0.0, kinds.finite))?;
         let probability = probability * kinds.finite;
         let light = light as usize;
         if let Some(light) = self.areas.lights.get(light) {
-            let view = light.view(position.as_dvec3(), normal)?;
+            let view = light.view(position, normal)?;
             return Some(Choice::Area { light, probability, view });
         }
         let light = &self.finite[light - self.areas.lights.len()];
@@ -213,15 +227,16 @@ impl Lights {
         if !above(normal, direction) {
             return 0.0;
         }
-        let Some(kinds) = self.kinds(position, normal) else {
+        let at_root = self.weigh(&Lit { position, normal, u: [0.0; 3] });
+        let Some(kinds) = self.kinds(&at_root, normal) else {
             return 0.0;
         };
-        let probability = kinds.finite * self.tree.probability(position, normal, light as u32);
+        let probability = kinds.finite * self.tree.probability(&at_root, position, normal, light as u32);
         if probability == 0.0 {
             return 0.0;
         }
         let offset = direction.as_dvec3() * f64::from(distance);
-        (probability * self.areas.lights[light].density(position.as_dvec3(), normal, offset)) as f32
+        (probability * self.areas.lights[light].density(position, normal, offset)) as f32
     }
 
     /// Radiance that a ray meets which leaves the scene into `direction`.
@@ -231,22 +246,29 @@ impl Lights {
 
     /// Density per solid angle with which [`Lights::sample`] would have chosen the unit `direction` into the environment.
     pub fn pdf_outside(&self, position: Vec3, normal: Vec3, direction: Vec3) -> f32 {
-        match (&self.environment, self.kinds(position, normal)) {
-            (Some(light), Some(kinds)) if above(normal, direction) => {
-                (kinds.environment * light.pdf(position, normal, direction)) as f32
-            }
-            _ => 0.0,
-        }
+        let Some(light) = self.environment.as_ref().filter(|_| above(normal, direction)) else {
+            return 0.0;
+        };
+        let kinds = self.kinds(&self.weigh(&Lit { position, normal, u: [0.0; 3] }), normal);
+        kinds.map_or(0.0, |kinds| (kinds.environment * light.pdf(position, normal, direction)) as f32)
     }
 
     /// How probable the kinds of lights are: equally, where they can reach the point. Which of them is occluded matters more than
     /// how strong they are (the sun seldom reaches a room).
-    fn kinds(&self, position: Vec3, normal: Vec3) -> Option<Kinds> {
+    #[inline(always)]
+    fn kinds(&self, at_root: &Importance, normal: Vec3) -> Option<Kinds> {
+        if self.directional.is_empty() && self.environment.is_none() {
+            return (!self.tree.is_empty()).then_some(Kinds { finite: 1.0, directional: 0.0, environment: 0.0 });
+        }
+        self.several_kinds(at_root, normal)
+    }
+
+    fn several_kinds(&self, at_root: &Importance, normal: Vec3) -> Option<Kinds> {
         let share = |reaches: bool| if reaches { 1.0 } else { 0.0 };
         let directional = self.directional.iter().any(|l| above(normal, towards(l)));
         let (directional, environment) = (share(directional), share(self.environment.is_some()));
         let alone = directional + environment == 0.0;
-        let finite = if alone { !self.tree.is_empty() } else { self.tree.reaches(position, normal) };
+        let finite = if alone { !self.tree.is_empty() } else { self.tree.reaches(at_root) };
         let sum = share(finite) + directional + environment;
         let kinds =
             || Kinds { finite: share(finite) / sum, directional: directional / sum, environment: environment / sum };
@@ -328,7 +350,7 @@ fn above(normal: Vec3, direction: Vec3) -> bool {
     normal == Vec3::ZERO || normal.dot(direction) > 0.0
 }
 
-/// `u` with the bits that f32 lacks: 2^-24 is more than the probability of one light among millions.
+/// `u` with the bits that f32 lacks: 2^-24 is more than the probability of one light among millions. Where there are few, nobody needs them.
 fn refined(u: f32, others: [f32; 2]) -> f64 {
     let below = unit(hash_all(&others.map(f32::to_bits)));
     (f64::from(u) + f64::from(below) / 16_777_216.0).min(1.0 - f64::EPSILON)

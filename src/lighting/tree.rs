@@ -2,8 +2,12 @@
 
 use glam::Vec3;
 
-use super::bounds::{Bounds, BoundsSum, Emitter, Emitters, LANES};
+use super::Lit;
+use super::bounds::{Bounds, BoundsSum, Emitter, Emitters, Importance, LANES};
 use crate::scene::Aabb;
+
+/// Lights of a small tree.
+const SMALL: usize = 1024;
 
 /// Candidate planes an axis.
 const BUCKETS: usize = 12;
@@ -58,14 +62,21 @@ impl LightTree {
         self.nodes.is_empty()
     }
 
-    /// Whether any light may reach the point.
-    pub(super) fn reaches(&self, position: Vec3, normal: Vec3) -> bool {
-        match self.nodes.first() {
-            None => false,
-            Some(root) => {
-                self.place.len() == 1 || running_sums(&root.emitters.importance(position, normal))[LANES - 1] > 0.0
-            }
+    /// Whether 24 random bits are enough to choose between its lights.
+    pub(super) fn is_small(&self) -> bool {
+        self.place.len() <= SMALL
+    }
+
+    /// The first step of a choice at each of some points: the importance of what is in the root. Zero where there is no choice.
+    pub(super) fn weigh(&self, lit: &[Lit], at_root: &mut [Importance]) {
+        if let (Some(root), 2..) = (self.nodes.first(), self.place.len()) {
+            root.emitters.importance_at(lit, at_root);
         }
+    }
+
+    /// Whether any light may reach a point with this importance `at_root`.
+    pub(super) fn reaches(&self, at_root: &Importance) -> bool {
+        self.place.len() == 1 || running_sums(at_root)[LANES - 1] > 0.0
     }
 
     /// Appends the node over `order` and all nodes below; returns its number.
@@ -87,33 +98,36 @@ impl LightTree {
         number
     }
 
-    /// Chooses a light with `u` in 0..1; returns it with its probability.
-    pub(super) fn sample(&self, position: Vec3, normal: Vec3, mut u: f64) -> Option<(u32, f64)> {
+    /// Chooses a light with `u` in 0..1, where importance is `at_root`; returns it with its probability.
+    pub(super) fn sample(&self, at_root: &Importance, position: Vec3, normal: Vec3, mut u: f64) -> Option<(u32, f64)> {
         if self.place.len() == 1 {
             return Some((0, 1.0));
         }
         let mut probability = 1.0;
         let mut node = self.nodes.first()?;
+        let mut importance = *at_root;
         loop {
-            let importance = node.emitters.importance(position, normal);
             let sums = running_sums(&importance);
             let total = sums[LANES - 1];
             if total <= 0.0 {
                 return None;
             }
             let target = u * f64::from(total);
+            // Divides while the lane is still looked for
+            let inverse = 1.0 / f64::from(total);
             // Counted without a branch. Lanes without importance end where the one before ends, and are never chosen; nor is
             // what comes after the total, should the target be rounded to it
             let rounded = target as f32;
             let lane = sums.iter().map(|&sum| u32::from((sum <= rounded) & (sum < total))).sum::<u32>() as usize;
             let value = f64::from(importance[lane]);
-            probability *= value / f64::from(total);
+            probability *= value * inverse;
             match node.children[lane] {
                 Child::Nothing => return None,
                 Child::Light(light) => return Some((light, probability)),
                 Child::Node(number) => {
-                    node = &self.nodes[number as usize];
                     let before = if lane == 0 { 0.0 } else { f64::from(sums[lane - 1]) };
+                    node = &self.nodes[number as usize];
+                    importance = node.emitters.importance(position, normal);
                     u = ((target - before) / value).clamp(0.0, 1.0 - f64::EPSILON);
                 }
             }
@@ -121,7 +135,7 @@ impl LightTree {
     }
 
     /// Probability with which [`LightTree::sample`] chooses `light`.
-    pub(super) fn probability(&self, position: Vec3, normal: Vec3, light: u32) -> f64 {
+    pub(super) fn probability(&self, at_root: &Importance, position: Vec3, normal: Vec3, light: u32) -> f64 {
         if self.place.len() == 1 {
             return 1.0;
         }
@@ -129,12 +143,12 @@ impl LightTree {
         let mut probability = 1.0;
         loop {
             let node = &self.nodes[number as usize];
-            let importance = node.emitters.importance(position, normal);
+            let importance = if number == 0 { *at_root } else { node.emitters.importance(position, normal) };
             let value = f64::from(importance[lane as usize]);
             if value <= 0.0 {
                 return 0.0;
             }
-            probability *= value / f64::from(running_sums(&importance)[LANES - 1]);
+            probability *= value * (1.0 / f64::from(running_sums(&importance)[LANES - 1]));
             if number == 0 {
                 return probability;
             }

@@ -150,10 +150,6 @@ pub struct RadiosityScene<'a> {
 
 /// Rays of the first solution for each lit side, in proportion to its relevance: enough to estimate the error.
 const FIRST_RAYS: f64 = 4.0;
-/// The same for few sides, where another solution would cost more than what it could save in rays ...
-const FIRST_RAYS_OF_FEW: f64 = 16.0;
-/// ... up to this number of rays.
-const FEW_RAYS: f64 = 65536.0;
 /// Fewest rays that the light of the first bounce is shot with.
 const LEAST_RAYS: u64 = 1 << 13;
 /// Solutions that may be averaged to reach the error.
@@ -240,8 +236,7 @@ impl Average {
         };
         // Direct light is gathered once; more shooting does not reduce its error.
         let of_direct = direct.as_ref().map_or(0.0, |d| d.error).min(0.9 * target);
-        let first = (FIRST_RAYS_OF_FEW * lit).min(FEW_RAYS).max(FIRST_RAYS * lit);
-        let mut rays = (first as u64).max(LEAST_RAYS);
+        let mut rays = ((FIRST_RAYS * lit) as u64).max(LEAST_RAYS);
         let mut total = 0;
         for round in 0..MAX_ROUNDS {
             self.add_pair(tracer, params, direct.as_ref(), rays, round, progress)?;
@@ -347,6 +342,7 @@ impl Average {
             .collect();
         Solution {
             of_patch,
+            largest_diameter: patches.diameter.iter().copied().fold(0.0, f32::max),
             ledger,
             patches: patches.len(),
             patch_size: patches.size as f32,

@@ -11,6 +11,8 @@ use super::patches::PatchMap;
 pub struct Solution {
     pub(super) map: PatchMap,
     pub(super) of_patch: Vec<PatchSolution>,
+    /// Of all patches.
+    pub(super) largest_diameter: f32,
     /// Unit normal of each triangle.
     pub(super) normals: Vec<Vec3>,
     /// Energy balance.
@@ -75,8 +77,10 @@ impl Solution {
         self.map.at(triangle, u, v)
     }
 
-    /// Diameter of that patch.
-    pub fn patch_diameter(&self, triangle: u32, u: f32, v: f32) -> f32 {
-        self.at(triangle, u, v).diameter
+    /// Whether that patch has a larger diameter than `length`.
+    #[inline]
+    pub fn is_larger(&self, length: f32, triangle: u32, u: f32, v: f32) -> bool {
+        // Patches lie all over the memory: most questions are answered without looking.
+        length < self.largest_diameter && length < self.at(triangle, u, v).diameter
     }
 }

@@ -11,7 +11,7 @@ use super::caustics::Caustics;
 use super::path::Path;
 use super::workspace::Workspace;
 use super::world::World;
-use crate::sampling::{hash_all, sobol};
+use crate::sampling::{SobolPoint, hash_all};
 use crate::scene::{Camera, Lens};
 use crate::shading::Lobes;
 use glam::{Vec2, Vec3};
@@ -72,7 +72,7 @@ pub fn measure(world: &World<'_>, camera: &Camera, params: &RenderParams, sample
             // Other random numbers than the first path's: only the first point and direction are shared.
             let detailed: Vec<Path> = gathers
                 .iter()
-                .map(|g| Path { near: f32::INFINITY, stream: hash_all(&[g.stream, STREAM]), ..*g })
+                .map(|g| Path { near: f32::INFINITY, numbers: g.numbers.elsewhere(STREAM), ..*g })
                 .collect();
             let traced = reference.gather(ws, &detailed, count as usize);
             let mut sums = Sums::default();
@@ -103,8 +103,9 @@ impl View {
     }
 
     fn path(&self, index: u32, stream: u32) -> Path {
-        let u = sobol(index, 0, stream);
-        Path::view(self.lens.ray(self.low + Vec2::new(u[0], u[1]) * self.size), index, index, stream)
+        let numbers = SobolPoint::new(index, stream);
+        let u = numbers.block(0);
+        Path::view(self.lens.ray(self.low + Vec2::new(u[0], u[1]) * self.size), index, numbers)
     }
 }
 

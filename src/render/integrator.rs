@@ -30,7 +30,6 @@ use crate::backend::{Coherence, Hit, Ray, Visible};
 use crate::lighting::guide::Guided;
 use crate::lighting::shadow::{ShadowRay, light_visibility};
 use crate::lighting::{LightSample, Lit};
-use crate::sampling::sobol;
 use crate::scene::Camera;
 use crate::shading::{Bsdf, Lobes, SurfacePoint};
 use crate::simplify::TriangleSource;
@@ -56,7 +55,7 @@ const PIXEL_FOOTPRINT: f32 = 0.5;
 const GATHER_FOOTPRINT: f32 = 0.05;
 
 /// Points that are shaded together: as many as stay close to the processor.
-const MET_AT_ONCE: usize = 256;
+const MET_AT_ONCE: usize = 128;
 
 /// Share of paths that gather rough reflection apart from diffuse, per unit of its albedo.
 const PATHS_PER_ALBEDO: f32 = 4.0;
@@ -80,7 +79,7 @@ impl World<'_> {
         ws.guide = (batch.first >= LEARN_FROM).then(|| std::mem::take(&mut tile.guide));
         ws.cone = view.cone();
         for (place, &pixel) in (0..).zip(batch.pixels) {
-            ws.paths.extend(view.paths(tile.pixel(pixel), batch.first, batch.trials, place * batch.trials));
+            view.append(tile.pixel(pixel), batch.first, batch.trials, place * batch.trials, &mut ws.paths);
         }
         ws.features.clear();
         if batch.features {
@@ -268,8 +267,8 @@ impl World<'_> {
         let path = ws.paths[index as usize];
         ws.note_distance(index, hit.t);
         // Within reach, and where the patch is large against the ray, the surface's own light is worked out.
-        let near = hit.t <= path.near
-            || (far.r_thresh > 0.0 && far.solution.patch_diameter(hit.triangle, hit.u, hit.v) > hit.t);
+        let near =
+            hit.t <= path.near || (far.r_thresh > 0.0 && far.solution.is_larger(hit.t, hit.triangle, hit.u, hit.v));
         let source = far.geometry.sources[hit.triangle as usize];
         if near && matches!(source, TriangleSource::Scene { .. }) {
             ws.note_near(index);
@@ -310,7 +309,7 @@ impl World<'_> {
         let wanted = if path.gathers { passes.lores } else { passes.hires };
         let lit = look_up.is_none() && wanted && path.depth < self.max_depth && !self.lights.is_empty();
         let lit = lit.then(|| {
-            let [choice, u, v, _] = sobol(path.index, path.block(), path.stream);
+            let [choice, u, v, _] = path.random(0);
             let normal = point.shading_normal_towards(-path.ray.direction);
             let guided = match &mut ws.guide {
                 Some(guide) if !path.gathers => guide.draw([choice, u, v]),
@@ -420,7 +419,7 @@ impl World<'_> {
 
         let choose_high = choose_high(low, high);
         let goes_on = look_up.is_none() && passes.lores && low != Vec3::ZERO;
-        let u = if choose_high > 0.0 || goes_on { sobol(path.index, path.block() + 1, path.stream) } else { [0.0; 4] };
+        let u = if choose_high > 0.0 || goes_on { path.random(1) } else { [0.0; 4] };
         if u[3] < choose_high {
             let Some(sample) = bsdf.sample_high([u[0], u[1], u[2]]) else { return };
             let arrival = match (sample.straight, sample.pdf) {

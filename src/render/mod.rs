@@ -44,6 +44,12 @@ use crate::scene::Camera;
 /// Trials of one pixel that are traced as one batch; a tile of these fills the second-level cache.
 pub const BATCH_TRIALS: u32 = 16;
 
+/// How much larger the error of single pixels may be than that of the image: what is left of noise is grain, not specks.
+pub const WORST_PIXEL: f32 = 4.0;
+
+/// Fewest trials of a pixel where nothing else is asked for.
+pub const LEAST_TRIALS: u32 = 4;
+
 /// Keeps the trials of frames apart.
 const FRAME: u32 = 0x6672_616d;
 

@@ -4,6 +4,7 @@ use glam::Vec3;
 
 use crate::backend::{Hit, Ray};
 use crate::lighting::guide::Guided;
+use crate::sampling::SobolPoint;
 use crate::shading::SurfacePoint;
 
 /// Blocks of four random numbers for each scattering event: one for light, one for the path.
@@ -66,15 +67,14 @@ pub struct Path {
     pub depth: u32,
     /// Index of the trial in its batch.
     pub trial: u32,
-    /// Number of the trial within its stream.
-    pub index: u32,
-    /// Stream of random numbers.
-    pub stream: u32,
+    /// Random numbers of the trial.
+    pub numbers: SobolPoint,
 }
 
 impl Path {
     /// A path that leaves the camera along `ray`.
-    pub fn view(ray: Ray, trial: u32, index: u32, stream: u32) -> Self {
+    #[inline]
+    pub fn view(ray: Ray, trial: u32, numbers: SobolPoint) -> Self {
         Path {
             ray,
             throughput: Vec3::ONE,
@@ -84,14 +84,14 @@ impl Path {
             bent: false,
             depth: 0,
             trial,
-            index,
-            stream,
+            numbers,
         }
     }
 
-    /// The first of this scattering event's blocks of random numbers; the camera has the block before the first event's.
-    pub(super) fn block(&self) -> u32 {
-        1 + self.depth * BLOCKS_PER_EVENT
+    /// Four random numbers of this scattering event, of `block` 0 or 1. The camera has the block before the first event's.
+    #[inline]
+    pub(super) fn random(&self, block: u32) -> [f32; 4] {
+        self.numbers.block(1 + self.depth * BLOCKS_PER_EVENT + block)
     }
 }
 

@@ -24,7 +24,7 @@ pub fn show_radiosity(world: &World<'_>, far: &FarField<'_>, camera: &Camera, pa
         let n = params.min_trials.max(1);
         let mut rays = Vec::with_capacity(tile.pixels.len() * n as usize);
         for i in 0..tile.pixels.len() as u32 {
-            rays.extend(view.paths(tile.pixel(i), 0, n, i * n).map(|path| path.ray));
+            rays.extend((0..n).map(|t| view.path(tile.pixel(i), t, i * n + t).ray));
         }
         let mut hits = vec![Hit::MISS; rays.len()];
         far.rays.closest(&rays, Visible::All, Coherence::Coherent, &mut hits);

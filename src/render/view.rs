@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3};
 
 use super::path::Path;
-use crate::sampling::{hash_all, sobol};
+use crate::sampling::{SobolStream, hash_all};
 use crate::scene::{Camera, Lens};
 
 /// Makes the first ray of every trial of an image.
@@ -32,16 +32,19 @@ impl ViewRays {
 
     /// Trial `number` of a pixel (column, row); `trial` is the path's place in its batch.
     pub fn path(&self, pixel: [u32; 2], number: u32, trial: u32) -> Path {
-        self.path_in(self.stream(pixel, number & 1), pixel, number >> 1, trial)
+        self.path_in(&SobolStream::new(self.stream(pixel, number & 1)), pixel, number >> 1, trial)
     }
 
-    /// Trials of a pixel from number `first` on, which take the places from `place` on in their batch.
-    pub fn paths(&self, pixel: [u32; 2], first: u32, count: u32, place: u32) -> impl Iterator<Item = Path> {
-        let streams = [0, 1].map(|half| self.stream(pixel, half));
-        (0..count).map(move |t| {
-            let number = first + t;
-            self.path_in(streams[(number & 1) as usize], pixel, number >> 1, place + t)
-        })
+    /// Appends `count` trials of a pixel from number `first` on, which take the places from `place` on in their batch.
+    pub fn append(&self, pixel: [u32; 2], first: u32, count: u32, place: u32, paths: &mut Vec<Path>) {
+        for half in [0, 1] {
+            let stream = SobolStream::new(self.stream(pixel, half));
+            let skipped = (first ^ half) & 1;
+            paths.extend((0..(count + 1 - skipped) / 2).map(|k| {
+                let t = skipped + 2 * k;
+                self.path_in(&stream, pixel, (first + t) >> 1, place + t)
+            }));
+        }
     }
 
     /// Even and odd trials come from two independent scramblings, so that their difference measures the error.
@@ -49,10 +52,11 @@ impl ViewRays {
         hash_all(&[y * self.size[0] + x, half, self.seed])
     }
 
-    fn path_in(&self, stream: u32, [x, y]: [u32; 2], index: u32, trial: u32) -> Path {
-        let u = sobol(index, 0, stream);
+    #[inline(always)]
+    fn path_in(&self, stream: &SobolStream, [x, y]: [u32; 2], index: u32, trial: u32) -> Path {
+        let (numbers, u) = stream.point(index);
         let size = Vec2::new(self.size[0] as f32, self.size[1] as f32);
         let film = (Vec2::new(x as f32, y as f32) + Vec2::new(u[0], u[1])) / size;
-        Path::view(self.lens.ray(film), trial, index, stream)
+        Path::view(self.lens.ray(film), trial, numbers)
     }
 }

@@ -9,6 +9,9 @@ use rayon::prelude::*;
 use super::{Aabb, Plane};
 use crate::backend::{Part, PartKind};
 
+/// Distance between unit vectors that rounding explains.
+const SAME_NORMAL: f32 = 1e-6;
+
 /// All triangles of a scene, in recentred world coordinates.
 ///
 /// Triangles are ordered by object, and objects by [`Object::kind`], so that each kind is one contiguous part.
@@ -54,8 +57,11 @@ pub struct Object {
 
 impl Mesh {
     /// Corner positions of a triangle.
+    #[inline]
     pub fn corners(&self, triangle: u32) -> [Vec3; 3] {
-        self.triangles[triangle as usize].map(|i| self.positions[i as usize])
+        let [a, b, c] = self.triangles[triangle as usize];
+        // Not `map`, which compilers make a call of.
+        [self.positions[a as usize], self.positions[b as usize], self.positions[c as usize]]
     }
 
     /// The object a triangle belongs to.
@@ -77,9 +83,22 @@ impl Mesh {
     /// Brings bounds and planes up to date with the triangles.
     pub fn measure(&mut self) {
         let corners = |t: &[u32; 3]| t.map(|i| self.positions[i as usize]);
-        let planes = self.triangles.par_iter().map(|t| Plane::of(corners(t))).collect();
+        let plane = |t: &[u32; 3]| {
+            let plane = Plane::of(corners(t));
+            Plane { flat: self.is_flat(t, plane.normal), ..plane }
+        };
+        let planes = self.triangles.par_iter().map(plane).collect();
         let bounds = self.triangles.par_iter().map(|t| Aabb::of(corners(t))).reduce(Aabb::default, Aabb::union);
         (self.planes, self.bounds) = (planes, bounds);
+    }
+
+    /// Whether a triangle has no shading normals, or those of its plane but for rounding.
+    fn is_flat(&self, triangle: &[u32; 3], normal: Vec3) -> bool {
+        if self.normals.is_empty() {
+            return true;
+        }
+        let normals = triangle.map(|i| self.normals[i as usize]);
+        normals.contains(&Vec3::ZERO) || normals.iter().all(|n| n.distance(normal) <= SAME_NORMAL)
     }
 
     /// Contiguous triangle ranges by kind, for a backend.

@@ -22,10 +22,12 @@ pub struct Plane {
     pub clearance: f32,
     /// Bound on the error along each axis of a point interpolated in f64, before it is rounded to f32.
     pub interpolation: f32,
+    /// Whether the triangle is shaded with this normal all over.
+    pub flat: bool,
 }
 
 impl Plane {
-    /// Of a triangle with these corners. Evaluated in f64.
+    /// Of a flat triangle with these corners. Evaluated in f64.
     ///
     /// The clearance bounds the error of an f32 intersection test: the signed distance to the plane is a determinant of
     /// vectors no longer than the triangle's extent `w` along each axis, divided by the length of the normal; its six products
@@ -38,7 +40,7 @@ impl Plane {
         let interpolation = 8.0 * f64::EPSILON * (a.abs() + b.abs() + c.abs()).max_element();
         let interpolation = (interpolation as f32).next_up();
         if double_area == 0.0 {
-            return Plane { interpolation, ..Plane::default() };
+            return Plane { interpolation, flat: true, ..Plane::default() };
         }
         let normal = cross / double_area;
         let rounding = ROUNDOFF * a.abs().max(b.abs()).max(c.abs()) + f64::from(interpolation);
@@ -49,6 +51,6 @@ impl Plane {
         // In a plane through the origin along the axes all of this is zero, and rays started in the plane would hit it at 0.
         let least = SMALLEST_OFFSET * extent.max_element();
         let clearance = test_error(extent + 2.0 * moved * normal.abs()).max(least);
-        Plane { normal: normal.as_vec3(), clearance: (clearance as f32).next_up(), interpolation }
+        Plane { normal: normal.as_vec3(), clearance: (clearance as f32).next_up(), interpolation, flat: true }
     }
 }

@@ -23,8 +23,6 @@ pub struct SurfacePoint {
     pub geometric_normal: Vec3,
     /// Unit shading normal on the side of `geometric_normal`, at most 89 degrees away from it.
     pub shading_normal: Vec3,
-    /// First and second texture coordinates; zero where the mesh has none.
-    pub uv: [Vec2; 2],
     /// Triangle.
     pub triangle: u32,
     /// Barycentric weight of the second vertex.
@@ -37,34 +35,24 @@ pub struct SurfacePoint {
 
 impl SurfacePoint {
     /// The point that `hit` names. `hit` must be a hit on `scene.mesh`.
+    #[inline]
     pub fn new(scene: &Scene, hit: &Hit) -> Self {
         let mesh = &scene.mesh;
-        let indices = mesh.triangles[hit.triangle as usize].map(|i| i as usize);
         let plane = &mesh.planes[hit.triangle as usize];
         let (position, error) = locate(mesh.corners(hit.triangle), plane, hit.u, hit.v);
         let geometric_normal = plane.normal;
-        let weights = [1.0 - hit.u - hit.v, hit.u, hit.v];
-
-        let uv = [&mesh.uvs[0], &mesh.uvs[1]].map(|set| {
-            if set.is_empty() {
-                return Vec2::ZERO;
-            }
-            weights[0] * set[indices[0]] + weights[1] * set[indices[1]] + weights[2] * set[indices[2]]
-        });
         let mut shading_normal = geometric_normal;
-        if !mesh.normals.is_empty() {
-            let normals = indices.map(|i| mesh.normals[i]);
-            if normals.iter().all(|n| *n != Vec3::ZERO) {
-                let sum = weights[0] * normals[0] + weights[1] * normals[1] + weights[2] * normals[2];
-                shading_normal = sum.normalize_or(geometric_normal);
-                if shading_normal.dot(geometric_normal) < 0.0 {
-                    shading_normal = -shading_normal;
-                }
+        if !plane.flat {
+            let [a, b, c] = mesh.triangles[hit.triangle as usize];
+            let [a, b, c] = [mesh.normals[a as usize], mesh.normals[b as usize], mesh.normals[c as usize]];
+            shading_normal = ((1.0 - hit.u - hit.v) * a + hit.u * b + hit.v * c).normalize_or(geometric_normal);
+            if shading_normal.dot(geometric_normal) < 0.0 {
+                shading_normal = -shading_normal;
             }
         }
         let material = &scene.materials[mesh.object(hit.triangle).material as usize];
         if let Some(slot) = &material.normal_texture {
-            let bent = mapped_normal(scene, hit.triangle, &uv, slot, material.normal_scale, shading_normal);
+            let bent = mapped_normal(scene, hit, slot, material.normal_scale, shading_normal);
             // What is bent below the surface stays unbent
             shading_normal = bent.filter(|n| n.dot(geometric_normal) > 0.0).unwrap_or(shading_normal);
         }
@@ -73,7 +61,6 @@ impl SurfacePoint {
             error,
             geometric_normal,
             shading_normal: within_limit(shading_normal, geometric_normal),
-            uv,
             triangle: hit.triangle,
             u: hit.u,
             v: hit.v,
@@ -81,8 +68,8 @@ impl SurfacePoint {
         }
     }
 
-    /// The point at `u`, `v` of a triangle with the given corners, which need not belong to a scene: flat, without texture
-    /// coordinates. `triangle` is only stored.
+    /// The point at `u`, `v` of a triangle with the given corners, which need not belong to a scene: flat.
+    /// `triangle` is only stored.
     pub fn flat(corners: [Vec3; 3], triangle: u32, u: f32, v: f32) -> Self {
         Self::on_plane(corners, &Plane::of(corners), triangle, u, v)
     }
@@ -95,7 +82,6 @@ impl SurfacePoint {
             error,
             geometric_normal: plane.normal,
             shading_normal: plane.normal,
-            uv: [Vec2::ZERO; 2],
             triangle,
             u,
             v,
@@ -120,6 +106,7 @@ impl SurfacePoint {
 
     /// Origin for a ray that leaves into `direction`: moved along the geometric normal to the side of `direction`
     /// by the error bound, and rounded away from the surface (pbrt 4ed 6.8.6).
+    #[inline]
     pub fn ray_origin(&self, direction: Vec3) -> Vec3 {
         let n = self.geometric_normal;
         let distance = n.abs().dot(self.error);
@@ -138,24 +125,15 @@ impl SurfacePoint {
     }
 }
 
-/// `normal` as the normal map bends it at texture coordinates `uv`; `None` where texture coordinates span no area.
-fn mapped_normal(
-    scene: &Scene,
-    triangle: u32,
-    uv: &[Vec2; 2],
-    slot: &TextureSlot,
-    scale: f32,
-    normal: Vec3,
-) -> Option<Vec3> {
-    let set = usize::from(slot.uv_set);
-    let coordinates = scene.mesh.uvs.get(set).filter(|uvs| !uvs.is_empty())?;
-    let [a, b, c] = scene.mesh.triangles[triangle as usize].map(|i| coordinates[i as usize]);
+/// `normal` as the normal map bends it at a hit; `None` where texture coordinates span no area.
+fn mapped_normal(scene: &Scene, hit: &Hit, slot: &TextureSlot, scale: f32, normal: Vec3) -> Option<Vec3> {
+    let coordinates = scene.mesh.uvs.get(usize::from(slot.uv_set)).filter(|uvs| !uvs.is_empty())?;
+    let [a, b, c] = scene.mesh.triangles[hit.triangle as usize].map(|i| coordinates[i as usize]);
     let [duv1, duv2] = [b - a, c - a].map(|d| slot.transform.transform_vector2(d));
-    let [a, b, c] = scene.mesh.corners(triangle);
+    let [a, b, c] = scene.mesh.corners(hit.triangle);
     let frame = texture_frame(normal, [b - a, c - a], [duv1, duv2])?;
 
-    let uv = slot.transform.transform_point2(uv[set]);
-    let map = 2.0 * scene.textures[slot.texture as usize].sample(uv).truncate() - Vec3::ONE;
+    let map = 2.0 * scene.texture(slot, hit.triangle, hit.u, hit.v).truncate() - Vec3::ONE;
     (frame * Vec3::new(map.x * scale, map.y * scale, map.z)).try_normalize()
 }
 
@@ -163,7 +141,8 @@ fn mapped_normal(
 ///
 /// Evaluated in f64, so that the position's own error is its rounding to f32.
 fn locate(corners: [Vec3; 3], plane: &Plane, u: f32, v: f32) -> (Vec3, Vec3) {
-    let [a, b, c] = corners.map(Vec3::as_dvec3);
+    // Not `map`, which compilers make a call of.
+    let (a, b, c) = (corners[0].as_dvec3(), corners[1].as_dvec3(), corners[2].as_dvec3());
     let position = (a + f64::from(u) * (b - a) + f64::from(v) * (c - a)).as_vec3();
     let rounding = ROUNDOFF * position.abs() + plane.interpolation;
     (position, rounding + plane.clearance * plane.normal.abs())
@@ -351,10 +330,13 @@ mod tests {
         assert_eq!(SurfacePoint::new(&scene, &hit).shading_normal, Vec3::Z);
         let tilted = Vec3::new(0.6, 0.0, 0.8);
         scene.mesh.normals = vec![-tilted; 3];
+        scene.mesh.measure();
         assert!((SurfacePoint::new(&scene, &hit).shading_normal - tilted).length() < 1e-6);
         scene.mesh.normals = vec![tilted, tilted, Vec3::ZERO];
+        scene.mesh.measure();
         assert_eq!(SurfacePoint::new(&scene, &hit).shading_normal, Vec3::Z);
         scene.mesh.normals = vec![Vec3::X; 3];
+        scene.mesh.measure();
         let limited = SurfacePoint::new(&scene, &hit).shading_normal;
         assert!((limited.z - MIN_NORMAL_COSINE).abs() < 1e-6 && limited.is_normalized());
     }

@@ -395,6 +395,7 @@ fn light_stays_on_its_side_of_the_geometry() {
     {
         let mut scene = scene(material);
         scene.mesh.normals = vec![Vec3::new(0.8, 0.0, 0.6); 3];
+        scene.mesh.measure();
         for (i, outgoing) in
             [towards(0.3), Vec3::new(-0.9, 0.1, 0.4).normalize(), -towards(0.5)].into_iter().enumerate()
         {

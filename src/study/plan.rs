@@ -62,12 +62,16 @@ pub enum Role {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sampling {
-    /// Fixed sampling whose number of trials doubles from 2 to `most`, and ends when `rel_mse` is passed.
+    /// As anyone renders: image after image is asked for with half the error of the one before ([`ERRORS`]), each from its beginning, until the
+    /// curves have nothing more to show.
+    Planned {
+        /// Most trials of a pixel.
+        most: u32,
+    },
+    /// Fixed sampling whose number of trials doubles from 2 to `most`.
     Rounds {
         /// Most trials of a pixel.
         most: u32,
-        /// Error that is enough.
-        rel_mse: f64,
     },
     /// The paper's rule: 10 to 30 trials, until the error is 5 % of a pixel.
     Paper,
@@ -97,8 +101,12 @@ pub struct Extent {
     pub other_trials: u32,
 }
 
-/// Where a curve of error against time has nothing more to show: below the smallest error that crossings are reported for.
-const ENOUGH: f64 = 7e-4;
+/// Errors of images that are asked for one after the other.
+pub const ERRORS: [f32; 7] = [0.4, 0.2, 0.1, 0.05, 0.025, 0.0125, 0.00625];
+
+/// relMSE of all light, and of direct and of indirect light alone, where curves of error against time have nothing more to show: below the
+/// smallest error that crossings are reported for, and below 2 %.
+pub const ENOUGH: [f64; 2] = [7e-4, 3.5e-4];
 
 impl Run {
     /// Names what the run is a result of, compared with a reference of so many trials: two runs of the same key give the same result.
@@ -118,7 +126,7 @@ impl Run {
     pub fn cost(&self, subject: &Subject) -> u64 {
         let pixels = f64::from(subject.size[0]) * f64::from(subject.size[1]);
         let trials = match self.sampling {
-            Sampling::Rounds { most, .. } => f64::from(most),
+            Sampling::Planned { most } | Sampling::Rounds { most } => f64::from(most),
             Sampling::Paper => 30.0,
         };
         let (trial, preparation) = match self.settings.method {
@@ -145,7 +153,7 @@ pub fn main_methods(base: &Settings, extent: Extent) -> Vec<Run> {
             role,
             label: label.to_owned(),
             settings: Settings { method, ..base.clone() },
-            sampling: Sampling::Rounds { most: extent.main_trials, rel_mse: ENOUGH },
+            sampling: Sampling::Planned { most: extent.main_trials },
             interpolate: true,
         })
         .collect()
@@ -167,14 +175,14 @@ pub fn ladder(subject: &Subject, base: &Settings, auto: f32, extent: Extent) -> 
     let as_in_paper = |method| Settings { method, ..paper.clone() };
     let radiosity = |geometry| Settings { geometry, ..as_in_paper(Method::Radiosity) };
 
-    let other = Sampling::Rounds { most: extent.other_trials, rel_mse: 0.0 };
-    let shown = Sampling::Rounds { most: 16, rel_mse: 0.0 };
+    let other = Sampling::Rounds { most: extent.other_trials };
+    let shown = Sampling::Rounds { most: 16 };
     let mut runs = main_methods(base, extent);
     let mut add = |role, label: &str, settings: Settings, sampling| {
         let interpolate = ![Role::Gather, Role::PaperGsii, Role::PassGsii].contains(&role);
         runs.push(Run { role, label: label.to_owned(), settings, sampling, interpolate });
     };
-    let main = Sampling::Rounds { most: extent.main_trials, rel_mse: ENOUGH };
+    let main = Sampling::Planned { most: extent.main_trials };
     add(Role::Gather, "GSII, no interpolation", gsii.clone(), main);
     for factor in [0.5, 2.0, 4.0] {
         let settings = Settings { r_thresh: Some(factor * auto), ..gsii.clone() };
@@ -186,7 +194,7 @@ pub fn ladder(subject: &Subject, base: &Settings, auto: f32, extent: Extent) -> 
     let boxes = Settings { box_fit: BoxFit::Paper1993, ..gsii.clone() };
     add(Role::Box, "GSII, paper's boxes", boxes, other);
     let at_paper = Settings { r_thresh: Some(paper_r_thresh), ..gsii.clone() };
-    add(Role::AtPaperRThresh, "GSII, paper's r_thresh", at_paper, other);
+    add(Role::AtPaperRThresh, "GSII, paper's r_thresh", at_paper, main);
     // Runs that differ in their trials only come one after the other: they are prepared once.
     add(Role::PaperGsii, "GSII, as in the paper", as_in_paper(Method::Gsii), other);
     add(Role::PassGsii, "GSII", as_in_paper(Method::Gsii), Sampling::Paper);
@@ -200,7 +208,7 @@ pub fn ladder(subject: &Subject, base: &Settings, auto: f32, extent: Extent) -> 
 
 /// The runs of one scene in the scaling with the number of triangles.
 pub fn scaling(base: &Settings) -> Vec<Run> {
-    let sampling = Sampling::Rounds { most: 16, rel_mse: 0.0 };
+    let sampling = Sampling::Rounds { most: 16 };
     let extent = Extent { main_trials: 16, other_trials: 16 };
     main_methods(base, extent).into_iter().map(|run| Run { role: Role::Scaling, sampling, ..run }).collect()
 }

@@ -126,7 +126,7 @@ impl Store {
 
     /// Where the image of a run with so many trials is.
     pub fn image(&self, key: &str, trials: f64) -> PathBuf {
-        self.folder.join(format!("{key}-{trials:.0}.exr"))
+        self.folder.join(format!("{key}-{trials:.1}.exr"))
     }
 
     /// A finished run, where it is there and can be read.

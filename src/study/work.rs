@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use super::error::{Halves, Picture, compare};
-use super::plan::{Run, Sampling};
+use super::error::{Errors, Halves, Picture, compare};
+use super::plan::{ENOUGH, ERRORS, Role, Run, Sampling};
 use super::record::{Point, Preparation, Record, Store};
 use super::reference::Reference;
 use super::subject::Subject;
@@ -13,7 +13,10 @@ use crate::image::{self, Metadata, WriteOptions};
 use crate::pipeline::{Prepared, Stats};
 use crate::progress::Progress;
 use crate::render::film::PixelSum;
-use crate::render::{Film, RayCounts, RenderParams};
+use crate::render::{Film, LEAST_TRIALS, RayCounts, RenderParams, WORST_PIXEL};
+
+/// Share of the most trials from which on no more can be asked for.
+const MOSTLY: f64 = 0.9;
 
 /// Keeps the images apart from the default seed's, which everybody looks at.
 const SEED: u32 = 1993;
@@ -78,7 +81,23 @@ pub fn perform(
     };
     let keep = Keep { store, subject, reference: reference.map(|r| &r.picture) };
     match run.sampling {
-        Sampling::Rounds { most, rel_mse } => {
+        Sampling::Planned { most } => {
+            for asked in ERRORS {
+                let watch = Stopwatch::start();
+                let image = prepared.render(&subject.camera, &planned(run, subject, most, asked), progress);
+                if image.stopped {
+                    break;
+                }
+                let share = image.times.hires_share();
+                let point = keep.point(&record.key, &image.film, watch.spent(), share, image.rays)?;
+                let enough = is_enough(run, &point) || point.trials > MOSTLY * f64::from(most);
+                record.points.push(point);
+                if enough {
+                    break;
+                }
+            }
+        }
+        Sampling::Rounds { most } => {
             let mut failed = None;
             let mut watch = Stopwatch::start();
             let mut rendering = Spent::default();
@@ -86,19 +105,12 @@ pub fn perform(
                 rendering += watch.spent();
                 let share = round.times.hires_share();
                 let result = keep.point(&record.key, round.film, rendering, share, round.rays);
-                let enough = match result {
-                    Ok(point) => {
-                        let enough = point.whole.is_some_and(|e| e.rel_mse < rel_mse);
-                        record.points.push(point);
-                        enough
-                    }
-                    Err(error) => {
-                        failed = Some(error);
-                        true
-                    }
-                };
+                match result {
+                    Ok(point) => record.points.push(point),
+                    Err(error) => failed = Some(error),
+                }
                 watch = Stopwatch::start();
-                !enough && !progress.stopped()
+                failed.is_none() && !progress.stopped()
             });
             if let Some(error) = failed {
                 return Err(error);
@@ -112,6 +124,20 @@ pub fn perform(
         }
     }
     Ok((!progress.stopped()).then_some(record))
+}
+
+/// Whether curves through a point have nothing more to show.
+fn is_enough(run: &Run, point: &Point) -> bool {
+    let [all, part] = ENOUGH;
+    let below = |errors: Option<Errors>, level: f64| errors.is_none_or(|e| e.rel_mse < level);
+    let parts = below(point.direct, part) && below(point.indirect, part);
+    // Prices of direct and indirect light are asked of GSII only.
+    below(point.whole, all) && (run.role != Role::Gsii || parts)
+}
+
+/// As `gsii render --error` does.
+fn planned(run: &Run, subject: &Subject, most: u32, error: f32) -> RenderParams {
+    RenderParams { error, ..params(run, subject, LEAST_TRIALS, most, WORST_PIXEL * error) }
 }
 
 fn params(run: &Run, subject: &Subject, min_trials: u32, max_trials: u32, error: f32) -> RenderParams {

@@ -94,17 +94,19 @@ fn probabilities_add_up() {
         for i in 0..40 {
             let position = 4.0 * random_point(60, i);
             let normal = if i % 4 == 0 { Vec3::ZERO } else { random_point(61, i).normalize() };
-            let sum: f64 = (0..2 * n).map(|l| lights.tree.probability(position, normal, l)).sum();
+            let at_root = lights.weigh(&Lit { position, normal, u: [0.0; 3] });
+            let probability = |light| lights.tree.probability(&at_root, position, normal, light);
+            let sum: f64 = (0..2 * n).map(probability).sum();
             // A group that looks promising as a whole may hold nothing that is: those choices give no sample
             // Sums of eight in f32, in up to four levels of the tree
             assert!(sum <= 1.0 + 4.0 * 8.0 * f64::from(f32::EPSILON), "{sum}");
             let draws = 4096;
             let mut missed = 0;
             for k in 0..draws {
-                match lights.tree.sample(position, normal, f64::from(random(62, k, i))) {
+                match lights.tree.sample(&at_root, position, normal, f64::from(random(62, k, i))) {
                     None => missed += 1,
                     Some((light, p)) => {
-                        let again = lights.tree.probability(position, normal, light);
+                        let again = probability(light);
                         assert!((p - again).abs() <= 1e-9 * p, "{p} {again}");
                     }
                 }
@@ -142,9 +144,10 @@ fn density_integrates_to_probability() {
     let lights = Lights::new(&scene);
     for i in 0..20 {
         let position = 4.0 * random_point(80, i);
-        let to_finite = lights.kinds(position, Vec3::ZERO).unwrap().finite;
+        let at_root = lights.weigh(&Lit { position, normal: Vec3::ZERO, u: [0.0; 3] });
+        let to_finite = lights.kinds(&at_root, Vec3::ZERO).unwrap().finite;
         for (l, light) in lights.areas.lights.iter().enumerate() {
-            let probability = to_finite * lights.tree.probability(position, Vec3::ZERO, l as u32);
+            let probability = to_finite * lights.tree.probability(&at_root, position, Vec3::ZERO, l as u32);
             let side = (position.as_dvec3() - light.first_corner()).dot(light.normal());
             if side < 0.0 && !light.both_faces {
                 continue;

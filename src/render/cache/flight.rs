@@ -4,7 +4,7 @@
 //! frame to frame in patches as large as the reach of records, which the eye sees as flicker where it does not see it as noise.
 //! With one cache for all, the error stays on the surfaces like paint.
 
-use super::{IrradianceCache, PASSES, Record, STREAM, Strata, gather_all};
+use super::{Fineness, IrradianceCache, PASSES, Record, STREAM, Strata, gather_all};
 use crate::render::view::ViewRays;
 use crate::render::world::World;
 use crate::sampling::hash_all;
@@ -21,8 +21,9 @@ impl IrradianceCache {
     ) -> Self {
         let mut cache = IrradianceCache { passes: PASSES.len(), ..IrradianceCache::default() };
         let Some(far) = &world.far else { return cache };
+        let fineness = Fineness::of(f32::INFINITY);
         for (pass, (spacing, rays)) in (0u32..).zip(PASSES) {
-            let strata = Strata::of(rays * cache.rays_for_noise());
+            let strata = Strata::of(rays * fineness.rays * cache.rays_for_noise());
             for (number, (camera, size)) in (0u32..).zip(views) {
                 let view = ViewRays::new(camera, *size, hash_all(&[seed, STREAM, number]));
                 let places = cache.places(world, &view, *size, spacing, pass);
@@ -34,7 +35,7 @@ impl IrradianceCache {
                 }
             }
         }
-        cache.check();
+        cache.check(fineness.tolerance);
         log::debug!("irradiance cache of {} views: {} records", views.len(), cache.len());
         cache
     }

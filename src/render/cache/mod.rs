@@ -24,7 +24,7 @@ use super::view::ViewRays;
 use super::workspace::Workspace;
 use super::world::{Captured, FarField, World};
 use crate::backend::Ray;
-use crate::sampling::{basis, hash_all, sobol};
+use crate::sampling::{SobolStream, basis, hash_all};
 use crate::scene::Camera;
 use clamp::clamped_distances;
 use index::Index;
@@ -35,12 +35,15 @@ use record::{Record, Strata};
 /// together share their noise.
 const PASSES: [(u32, f32); 4] = [(16, 768.0), (8, 432.0), (4, 300.0), (2, 192.0)];
 
-/// Relative error of an image for which records have so many rays. Noise of records is not seen in that of pixels, and falls as
-/// slowly as any.
-const ERROR: f32 = 0.015;
+/// Relative error of an image for which records have so many rays; where none is asked for, they are made for this one. Noise of records is
+/// not seen in that of pixels, and falls as slowly as any.
+const ERROR: f32 = 0.02;
 
-/// Factors that the number of rays is kept between.
-const RAYS: [f32; 2] = [0.25, 4.0];
+/// For smaller errors they have more of them by this power, fewer for larger ones, ...
+const RAYS_POWER: f32 = 1.5;
+
+/// ... by a factor between these.
+const RAYS: [f32; 2] = [0.25, 8.0];
 
 /// Relative standard deviation of a record's single ray for which records have so many rays. They get more in proportion to it, as is best where
 /// the rest of the work has a noise of its own (Neyman), but at most so many times as many.
@@ -56,8 +59,12 @@ const ACCURACY: f32 = 0.3;
 /// Records refuse that had to be given more than this many times the reach that their distances allow, as a share.
 const TOO_SMALL: f32 = 0.25;
 
-/// Relative difference from what the others say at which a record refuses.
-const TOLERANCE: f32 = 0.2;
+/// Relative difference from what the others say at which a record refuses, in errors of the image: what interpolates worse than that is
+/// gathered by each path, so that an image comes to any error ...
+const TOLERANCE: f32 = 4.0;
+
+/// ... within these bounds: below the first, records differ by their noise.
+const TOLERANCES: [f32; 2] = [0.03, 0.2];
 
 /// Least reach in pixels.
 const LEAST_PIXELS: f32 = 3.0;
@@ -130,7 +137,7 @@ impl IrradianceCache {
         let view = ViewRays::new(camera, size, hash_all(&[seed, STREAM]));
         while let Some(&(spacing, rays)) = PASSES.get(self.passes) {
             let pass = self.passes as u32;
-            let strata = Strata::of(rays * rays_for(params.error) * self.rays_for_noise());
+            let strata = Strata::of(rays * Fineness::of(params.error).rays * self.rays_for_noise());
             let places = self.places(world, &view, size, spacing, pass);
             while self.next < places.len() {
                 let chunk = self.next..(self.next + CHUNK).min(places.len());
@@ -149,7 +156,7 @@ impl IrradianceCache {
             self.passes += 1;
             log::debug!("irradiance cache: {} places at every {spacing} pixels, {} records", places.len(), self.len());
             if self.is_full() {
-                self.check();
+                self.check(Fineness::of(params.error).tolerance);
                 let refuse = self.records.iter().filter(|r| r.refuses).count();
                 log::debug!("irradiance cache: {refuse} of {} records refuse", self.len());
             }
@@ -237,11 +244,11 @@ impl IrradianceCache {
     }
 
     /// Asks the others what each record measured itself. Records that are told something else refuse.
-    fn check(&mut self) {
+    fn check(&mut self, tolerance: f32) {
         let is_off = |own: &Record| {
             self.told(own, |_| true).is_some_and(|told| {
                 let (told, measured) = (told.element_sum(), own.radiance.element_sum());
-                (told - measured).abs() > TOLERANCE * told.max(measured)
+                (told - measured).abs() > tolerance * told.max(measured)
             })
         };
         let refuses: Vec<bool> = self.records.par_iter().map(is_off).collect();
@@ -251,9 +258,24 @@ impl IrradianceCache {
     }
 }
 
-/// Factor on the rays of records for an image of relative error `error`; one where none is asked for.
-fn rays_for(error: f32) -> f32 {
-    if error.is_finite() { (ERROR / error).clamp(RAYS[0], RAYS[1]) } else { 1.0 }
+/// How good records must be for an image of a given error.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Fineness {
+    /// Factor on their rays.
+    rays: f32,
+    /// Relative difference from what the others say at which one refuses.
+    tolerance: f32,
+}
+
+impl Fineness {
+    /// For an image of relative error `error`; infinite where none is asked for.
+    fn of(error: f32) -> Self {
+        let error = if error.is_finite() { error } else { ERROR };
+        Fineness {
+            rays: (ERROR / error).powf(RAYS_POWER).clamp(RAYS[0], RAYS[1]),
+            tolerance: (TOLERANCE * error).clamp(TOLERANCES[0], TOLERANCES[1]),
+        }
+    }
 }
 
 /// A place that may get a record.
@@ -295,17 +317,18 @@ fn gather(
     let Captured { point, normal, .. } = &place.captured;
     let frame = basis(*normal);
     let mut once = |stream: u32| {
+        let stream = SobolStream::new(stream);
         let paths: Vec<Path> = strata
             .in_blocks()
             .map(|k| {
-                let [u, v, near, _] = sobol(k as u32, 0, stream);
+                let (numbers, [u, v, near, _]) = stream.point(k as u32);
                 let direction = strata.direction(&frame, k, [u, v]);
                 Path {
                     near: far.r_thresh * (0.5 + near),
                     arrival: Arrival::Soft,
                     gathers: true,
                     depth: 1,
-                    ..Path::view(Ray::new(point.ray_origin(direction), direction), k as u32, k as u32, stream)
+                    ..Path::view(Ray::new(point.ray_origin(direction), direction), k as u32, numbers)
                 }
             })
             .collect();
