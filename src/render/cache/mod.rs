@@ -35,8 +35,8 @@ use record::{Record, Strata};
 /// together share their noise.
 const PASSES: [(u32, f32); 4] = [(16, 768.0), (8, 432.0), (4, 300.0), (2, 192.0)];
 
-/// Relative error of an image for which records have so many rays; where none is asked for, they are made for this one. Noise of records is
-/// not seen in that of pixels, and falls as slowly as any.
+/// Relative error of an image for which records have so many rays, as where none is asked for. Noise of records is not seen in that of pixels,
+/// and falls as slowly as any.
 const ERROR: f32 = 0.02;
 
 /// For smaller errors they have more of them by this power, fewer for larger ones, ...
@@ -270,7 +270,10 @@ struct Fineness {
 impl Fineness {
     /// For an image of relative error `error`; infinite where none is asked for.
     fn of(error: f32) -> Self {
-        let error = if error.is_finite() { error } else { ERROR };
+        if !error.is_finite() {
+            // Few trials may follow: what they gather themselves would be noise.
+            return Fineness { rays: 1.0, tolerance: TOLERANCES[1] };
+        }
         Fineness {
             rays: (ERROR / error).powf(RAYS_POWER).clamp(RAYS[0], RAYS[1]),
             tolerance: (TOLERANCE * error).clamp(TOLERANCES[0], TOLERANCES[1]),
