@@ -99,7 +99,7 @@ fn how() -> &'static str {
      traced in two halves with independent random numbers; the product of the differences to each half has the expectation of the squared error \
      without the reference's own noise. Each image has two halves too: mixing those tells what more trials would not remove (its bias) from noise. What both halves share, the interpolated indirect light of GSII and its radiosity \
      solution, counts as bias here, though part of it is noise of another kind.</p>\
-     <p><b>Curves</b> of MCPT, PMM and GSII as they are by default show images that were asked for with half the error of the one before (gsii render \
+     <p><b>Curves</b> of MCPT, PMM and GSII as they are by default, of GSII without interpolation and of GSII with the paper's r_thresh show images that were asked for with half the error of the one before (gsii render \
      --error), each with all that it takes from its beginning. Those of other settings come from one run each whose trials double. Seeds of images and \
      reference differ.</p>\
      <p>Thick lines: the methods as they are by default. Dashed: GSII with other settings.</p>"

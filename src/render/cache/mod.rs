@@ -135,9 +135,10 @@ impl IrradianceCache {
         };
         let (size, seed) = ([params.width, params.height], params.seed);
         let view = ViewRays::new(camera, size, hash_all(&[seed, STREAM]));
+        let fineness = Fineness::of(params.error);
         while let Some(&(spacing, rays)) = PASSES.get(self.passes) {
             let pass = self.passes as u32;
-            let strata = Strata::of(rays * Fineness::of(params.error).rays * self.rays_for_noise());
+            let strata = Strata::of(rays * fineness.rays * self.rays_for_noise());
             let places = self.places(world, &view, size, spacing, pass);
             while self.next < places.len() {
                 let chunk = self.next..(self.next + CHUNK).min(places.len());
@@ -156,7 +157,7 @@ impl IrradianceCache {
             self.passes += 1;
             log::debug!("irradiance cache: {} places at every {spacing} pixels, {} records", places.len(), self.len());
             if self.is_full() {
-                self.check(Fineness::of(params.error).tolerance);
+                self.check(fineness.tolerance);
                 let refuse = self.records.iter().filter(|r| r.refuses).count();
                 log::debug!("irradiance cache: {refuse} of {} records refuse", self.len());
             }
