@@ -315,7 +315,7 @@ impl Settings {
             error: self.radiosity_error,
             seed: self.seed,
             ambient: true,
-            leave_out_covered: true,
+            textbook: false,
             max_patches: 400_000,
         }
     }

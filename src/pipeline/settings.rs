@@ -110,7 +110,7 @@ impl Default for Settings {
             face_resolution: 2,
             patch_size: None,
             least_patches: 1,
-            unshot: 0.01,
+            unshot: 0.002,
             direct: DirectLight::Gather,
             radiosity_error: 0.15,
             focus: None,

@@ -4,8 +4,10 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::RadiosityScene;
+use super::arrived::{Place, Places};
 use super::patches::Patches;
 use super::shoot::side_normal;
+use super::{LEAST_PLACES, MOST_PLACES};
 use crate::backend::{Coherence, Ray};
 use crate::lighting::shadow::{ShadowBuffers, ShadowRay, light_visibility};
 use crate::lighting::{LightSample, Lit};
@@ -22,6 +24,9 @@ const PILOT_FAR: u32 = 2;
 const LEAST: [u32; 2] = [4, 1];
 /// Most samples of a side.
 const MOST: u32 = 1 << 14;
+/// Relative variance of single samples above which the direct light of a side counts as uneven: as much as when a twentieth of the light
+/// is hidden from a part of the side.
+const UNEVEN: f64 = 0.05;
 /// Relevance below which a side hardly matters.
 const FAR: f64 = 0.05;
 /// Sides looked at by one job.
@@ -31,38 +36,60 @@ const JOB: usize = 64;
 pub(super) struct Direct {
     /// Incident flux of each side, two independent estimates, W.
     pub incident: [Vec<DVec3>; 2],
+    /// Where that arrived, one entry a side; empty where it was not to be remembered.
+    pub places: [Vec<Option<Places>>; 2],
+    /// Sides whose samples differ so much that their mean says little of a point.
+    pub uneven: Vec<bool>,
     /// Relative error expected of their mean (flux-weighted, as [`Solution::error`](super::Solution::error)).
     pub error: f64,
     /// Shadow rays traced.
     pub rays: u64,
 }
 
+impl Direct {
+    /// Incident flux of the uneven sides; 0 elsewhere, W.
+    pub fn uneven(&self) -> Vec<DVec3> {
+        let [a, b] = &self.incident;
+        let flux = |side: usize| if self.uneven[side] { 0.5 * (a[side] + b[side]) } else { DVec3::ZERO };
+        (0..a.len()).map(flux).collect()
+    }
+}
+
 /// Mean irradiance of a side and the variance of one sample, summed over bands.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Default)]
 struct Estimate {
     mean: DVec3,
     /// Zero when there was only one sample.
     variance: f64,
     rays: u64,
+    /// Where the light was found, if that is asked for.
+    places: Option<Places>,
+}
+
+impl Estimate {
+    /// Whether single samples differ much from each other.
+    fn is_uneven(&self) -> bool {
+        self.variance > UNEVEN * self.mean.element_sum().powi(2)
+    }
 }
 
 /// Gathers direct light with samples placed so that the mean of both estimates has the relative error `target`.
 ///
 /// A pilot decides how many samples each side gets and is then forgotten: deciding by the samples that are used would
-/// bias the mean.
-pub(super) fn gather(input: &RadiosityScene<'_>, patches: &Patches, seed: u32, target: f64) -> Direct {
+/// bias the mean. With `places` it is remembered where the light arrived.
+pub(super) fn gather(input: &RadiosityScene<'_>, patches: &Patches, places: bool, seed: u32, target: f64) -> Direct {
     let sides = 2 * patches.len();
     let area = |side: usize| patches.open_area(side as u32);
     let stream = |what: u32| sampling::hash_all(&[seed, 0x00d1_9ec7, what]);
     let far = |side: usize| patches.relevance[side / 2] < FAR;
     let pilot_counts: Vec<u32> = (0..sides).map(|s| if far(s) { PILOT_FAR } else { PILOT }).collect();
-    let mut pilot = estimate(input, patches, &pilot_counts, stream(2));
+    let mut pilot = estimate(input, patches, &pilot_counts, false, stream(2));
     let mut pilot_rays: u64 = pilot.iter().map(|e| e.rays).sum();
     // Where half of the samples choose a light source behind the side, all eight do so on one side in 256, which would then get the fewest
     // samples: what looks dark is looked at again.
     let again = |side: usize| if pilot[side].mean == DVec3::ZERO && !far(side) { PILOT_DARK } else { 0 };
     let again: Vec<u32> = (0..sides).map(again).collect();
-    for (side, second) in estimate(input, patches, &again, stream(3)).into_iter().enumerate() {
+    for (side, second) in estimate(input, patches, &again, false, stream(3)).into_iter().enumerate() {
         pilot_rays += second.rays;
         if again[side] > 0 {
             pilot[side] = second;
@@ -84,21 +111,26 @@ pub(super) fn gather(input: &RadiosityScene<'_>, patches: &Patches, seed: u32, t
         .map(u32::next_power_of_two)
         .collect();
     let expected: f64 = spread.iter().zip(&counts).map(|(x, &n)| x / f64::from(2 * n).sqrt()).sum();
-    let mut direct = Direct {
-        incident: [Vec::new(), Vec::new()],
+    let mut rays = pilot_rays;
+    let halves = [0, 1].map(|half| {
+        let mut estimates = estimate(input, patches, &counts, places, stream(half));
+        rays += estimates.iter().map(|e| e.rays).sum::<u64>();
+        let found = if places { estimates.iter_mut().map(|e| e.places.take()).collect() } else { Vec::new() };
+        (estimates.iter().enumerate().map(|(s, e)| area(s) * e.mean).collect(), found)
+    });
+    let [(a, at_a), (b, at_b)] = halves;
+    Direct {
+        incident: [a, b],
+        places: [at_a, at_b],
+        // By the pilot, for the same reason: of sides whose own samples miss a patch of sunlight, all would stay dark.
+        uneven: pilot.iter().map(Estimate::is_uneven).collect(),
         error: if flux > 0.0 { expected / flux } else { 0.0 },
-        rays: pilot_rays,
-    };
-    for half in 0..2 {
-        let estimates = estimate(input, patches, &counts, stream(half));
-        direct.rays += estimates.iter().map(|e| e.rays).sum::<u64>();
-        direct.incident[half as usize] = estimates.iter().enumerate().map(|(s, e)| area(s) * e.mean).collect();
+        rays,
     }
-    direct
 }
 
 /// Irradiance of every side from `counts` samples each.
-fn estimate(input: &RadiosityScene<'_>, patches: &Patches, counts: &[u32], stream: u32) -> Vec<Estimate> {
+fn estimate(input: &RadiosityScene<'_>, patches: &Patches, counts: &[u32], places: bool, stream: u32) -> Vec<Estimate> {
     counts
         .par_chunks(JOB)
         .enumerate()
@@ -143,7 +175,7 @@ fn estimate(input: &RadiosityScene<'_>, patches: &Patches, counts: &[u32], strea
                     t_far: light.distance,
                 };
                 rays.push(ShadowRay { ray, light: light.triangle });
-                values.push((owner, f64::from(cos) * light.weight.as_dvec3()));
+                values.push((owner, Place::of(point), f64::from(cos) * light.weight.as_dvec3()));
             }
             through.clear();
             through.resize(rays.len(), Vec3::ONE);
@@ -151,10 +183,18 @@ fn estimate(input: &RadiosityScene<'_>, patches: &Patches, counts: &[u32], strea
             light_visibility(input.rays, input.scene, sources, rays, Coherence::Coherent, shadow, through);
             let mut estimates = vec![Estimate::default(); counts.len()];
             let mut squares = [0.0; JOB];
-            for (&(k, value), seen) in values.iter().zip(through.iter()) {
+            for (&(k, place, value), seen) in values.iter().zip(through.iter()) {
                 let value = value * seen.as_dvec3();
-                estimates[k as usize].mean += value;
-                estimates[k as usize].rays += 1;
+                let estimate = &mut estimates[k as usize];
+                estimate.mean += value;
+                estimate.rays += 1;
+                if places && value != DVec3::ZERO {
+                    let (side, count) = ((job * JOB) as u32 + k, counts[k as usize]);
+                    let kept = (count as usize).clamp(LEAST_PLACES, MOST_PLACES);
+                    let random = sampling::unit(sampling::hash_all(&[stream, side, estimate.rays as u32]));
+                    let flux = patches.open_area(side) / f64::from(count) * value.element_sum();
+                    estimate.places.get_or_insert_with(|| Places::new(kept)).offer(place, flux, random);
+                }
                 squares[k as usize] += value.element_sum().powi(2);
             }
             for ((estimate, square), &count) in estimates.iter_mut().zip(squares).zip(counts) {
@@ -179,8 +219,8 @@ struct Buffers {
     /// Number of the side in its job, for each point.
     owners: Vec<u32>,
     rays: Vec<ShadowRay>,
-    /// For each ray the number of its side, and the irradiance it brings when nothing is in its way.
-    values: Vec<(u32, DVec3)>,
+    /// For each ray the number of its side, where it starts, and the irradiance it brings when nothing is in its way.
+    values: Vec<(u32, Place, DVec3)>,
     through: Vec<Vec3>,
     shadow: ShadowBuffers,
 }

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use glam::DVec3;
 
+use super::arrived::Arrived;
 use super::ledger::Tally;
 use super::shoot::{Deposit, Load, Photons, Shot, Tracer};
 use crate::backend::{Hit, Ray};
@@ -14,8 +15,8 @@ use crate::shading::SurfacePoint;
 
 /// Light on patches that was shot from light sources.
 pub(super) struct Emitted {
-    /// Incident flux of each side, W.
-    pub incident: Vec<DVec3>,
+    /// What arrived.
+    pub arrived: Arrived,
     /// Flux that set out.
     pub flux: DVec3,
     /// What else became of it.
@@ -25,7 +26,7 @@ pub(super) struct Emitted {
 }
 
 /// Shoots all light: emitting patches as any patch, with exactly their flux, and what shines without area or from outside. Uses about `rays` rays.
-pub(super) fn shoot_all(tracer: &Tracer<'_>, rays: u64, stream: u32) -> Emitted {
+pub(super) fn shoot_all(tracer: &Tracer<'_>, rays: u64, mut arrived: Arrived, stream: u32) -> Emitted {
     let area = |side: u32| tracer.patches.open_area(side);
     let punctual = punctual(tracer.input.scene);
     let of_patches: DVec3 = tracer.optics.emission.iter().map(|&(side, exitance)| area(side) * exitance).sum();
@@ -42,36 +43,33 @@ pub(super) fn shoot_all(tracer: &Tracer<'_>, rays: u64, stream: u32) -> Emitted 
             let flux = area(side) * exitance;
             let rays = (importance(flux) * density).round().clamp(1.0, u32::MAX.into()) as u32;
             let stream = sampling::hash_all(&[stream, side]);
-            Shot { side, rays, flux: flux / f64::from(rays), stream }
+            Shot { side, rays, flux: flux / f64::from(rays), stream, from: None }
         })
         .collect();
-    let mut incident = vec![DVec3::ZERO; 2 * tracer.patches.len()];
-    let mut tally = tracer.shoot(&shots, &mut incident);
+    let mut tally = tracer.shoot(&shots, &mut arrived);
     let mut flux = of_patches;
     if !punctual.is_empty() {
         let count = ((importance(of_lights) * density) as u64).max(1024);
         let photons = |range: Range<u64>, photons: &mut Photons| {
             emit(tracer.input.scene, &punctual, range, count, sampling::hash(stream), photons);
         };
-        let of_lights = tracer.trace(count, &photons, Deposit::All, &mut incident);
+        let of_lights = tracer.trace(count, &photons, Deposit::All, &mut arrived);
         tally.add(&of_lights);
         // Colours of rays differ, so what set out is known only from what became of it.
-        let arrived: DVec3 = incident.iter().sum();
-        flux = arrived + tally.escaped + tally.lost - tally.passed_on;
+        let all: DVec3 = arrived.flux.iter().sum();
+        flux = all + tally.escaped + tally.lost - tally.passed_on;
     }
-    Emitted { incident, flux, tally, shots: shots.len() as u64 }
+    Emitted { arrived, flux, tally, shots: shots.len() as u64 }
 }
 
 /// Shoots `count` rays from the light sources and keeps what a mirror or a refracting surface has bent: light that shadow rays
-/// cannot find. `flux` of the result is zero, as this light was counted where it met the mirror or glass.
-pub(super) fn shoot_bent(tracer: &Tracer<'_>, count: u64, stream: u32) -> Emitted {
+/// cannot find. It sets out a second time here: it was counted where it met the mirror or glass.
+pub(super) fn shoot_bent(tracer: &Tracer<'_>, count: u64, arrived: &mut Arrived, stream: u32) -> Tally {
     let input = tracer.input;
-    let mut incident = vec![DVec3::ZERO; 2 * tracer.patches.len()];
     let photons = |range: Range<u64>, photons: &mut Photons| {
         emit(input.scene, input.lights, range, count, stream, photons);
     };
-    let tally = tracer.trace(count, &photons, Deposit::Bent, &mut incident);
-    Emitted { incident, flux: DVec3::ZERO, tally, shots: 1 }
+    tracer.trace(count, &photons, Deposit::Bent, arrived)
 }
 
 /// The lights of `scene` that have no area, and its environment.

@@ -4,6 +4,7 @@
 //! `emit` by shooting) and lets the largest unshot flux shoot first (`refine`, `shoot`). Everything is done twice with
 //! independent random numbers, so that the [`Solution`] knows its statistical error.
 
+mod arrived;
 mod direct;
 mod emit;
 mod ledger;
@@ -26,6 +27,7 @@ use crate::progress::Progress;
 use crate::sampling;
 use crate::scene::Scene;
 use crate::simplify::{Cluster, SimplifiedGeometry};
+use arrived::Arrived;
 use direct::Direct;
 pub use ledger::Ledger;
 use ledger::Tally;
@@ -51,10 +53,10 @@ pub struct RadiosityParams {
     /// Whether the effect of the unshot flux is estimated and added at the end. Without it radiosities are too low: in a
     /// closed room of reflectance rho by rho times the unshot share.
     pub ambient: bool,
-    /// Whether parts of a patch that something covers closely (within a tenth of its diameter) are left out of it. Without that a patch
-    /// is its whole area, as in the textbooks' form factors: exact for large patches that meet at an angle, too dark where furniture
-    /// stands against a wall.
-    pub leave_out_covered: bool,
+    /// Whether a patch is as in the textbooks: its whole area, lit and shining evenly. That is what form factors assume: too dark where furniture
+    /// stands against a wall, and light spreads over each patch that it meets. Otherwise parts that something covers closely (within a
+    /// tenth of the diameter) are left out, and reflected light leaves from where it arrived.
+    pub textbook: bool,
     /// How direct light reaches the patches.
     pub direct: DirectLight,
     /// Relative statistical error to aim for: decides how many rays are shot.
@@ -77,7 +79,7 @@ impl RadiosityParams {
             max_patches: 400_000,
             unshot: 0.01,
             ambient: true,
-            leave_out_covered: true,
+            textbook: false,
             direct: DirectLight::Gather,
             error: 0.02,
             focus: None,
@@ -152,6 +154,9 @@ pub struct RadiosityScene<'a> {
 const FIRST_RAYS: f64 = 4.0;
 /// Fewest rays that the light of the first bounce is shot with.
 const LEAST_RAYS: u64 = 1 << 13;
+/// Fewest and most points of a side that its light leaves from.
+const LEAST_PLACES: usize = 16;
+const MOST_PLACES: usize = 256;
 /// Solutions that may be averaged to reach the error.
 const MAX_ROUNDS: u32 = 4;
 
@@ -182,7 +187,7 @@ pub fn solve(input: &RadiosityScene<'_>, params: &RadiosityParams, progress: &Pr
         ));
     }
     if !input.lights.is_empty() && patches.len() > 0 {
-        if params.leave_out_covered {
+        if !params.textbook {
             patches.leave_out_covered(input, params.seed);
         }
         if let Some(focus) = &params.focus {
@@ -198,6 +203,8 @@ pub fn solve(input: &RadiosityScene<'_>, params: &RadiosityParams, progress: &Pr
 struct Average {
     /// Sum of incident flux of each side, weighted with `weight`.
     sums: [Vec<DVec3>; 2],
+    /// Incident flux of each side straight from light sources, where it is uneven; 0 elsewhere.
+    uneven: Vec<DVec3>,
     weight: f64,
     ledger: Ledger,
     rays: u64,
@@ -209,6 +216,7 @@ impl Average {
     fn new(sides: usize) -> Self {
         Average {
             sums: [vec![DVec3::ZERO; sides], vec![DVec3::ZERO; sides]],
+            uneven: vec![DVec3::ZERO; sides],
             weight: 0.0,
             ledger: Ledger::default(),
             rays: 0,
@@ -222,10 +230,15 @@ impl Average {
     fn solve(&mut self, tracer: &Tracer<'_>, params: &RadiosityParams, progress: &Progress) -> Result<()> {
         let target = f64::from(params.error);
         let direct = match params.direct {
-            DirectLight::Gather => Some(direct::gather(tracer.input, tracer.patches, params.seed, 0.5 * target)),
+            DirectLight::Gather => {
+                Some(direct::gather(tracer.input, tracer.patches, !params.textbook, params.seed, 0.5 * target))
+            }
             DirectLight::Shoot => None,
         };
-        self.rays += direct.as_ref().map_or(0, |d| d.rays);
+        if let Some(direct) = &direct {
+            self.rays += direct.rays;
+            self.uneven = direct.uneven();
+        }
         let relevance = |side: usize| tracer.patches.relevance[side / 2];
         let lit: f64 = match &direct {
             Some(direct) => {
@@ -273,23 +286,27 @@ impl Average {
         progress: &Progress,
     ) -> Result<()> {
         let weight = rays as f64;
+        let sides = 2 * tracer.patches.len();
         let solution = |half: usize, progress: &Progress| {
             let stream = |what: u32| sampling::hash_all(&[params.seed, round, half as u32, what]);
+            // As many as rays that leave a side, about: fewer would make the light of large patches uncertain.
+            let kept = (rays as usize / sides).clamp(LEAST_PLACES, MOST_PLACES);
+            let start = |flux, places| Arrived::new(flux, places, kept, stream(2));
             let mut run = match gathered {
                 Some(gathered) => {
-                    let mut incident = gathered.incident[half].clone();
-                    let emitted = incident.iter().sum();
+                    let mut arrived = start(gathered.incident[half].clone(), gathered.places[half].clone());
+                    let emitted = arrived.flux.iter().sum();
                     let mut tally = Tally::default();
                     if tracer.optics.any_specular {
-                        let bent = emit::shoot_bent(tracer, rays / 2, stream(0));
-                        incident.iter_mut().zip(&bent.incident).for_each(|(sum, flux)| *sum += flux);
-                        tally = bent.tally;
+                        tally = emit::shoot_bent(tracer, rays / 2, &mut arrived, stream(0));
                     }
-                    Run::new(tracer, incident, emitted, tally, stream(1))
+                    Run::new(tracer, arrived, emitted, tally, stream(1))
                 }
                 None => {
-                    let light = emit::shoot_all(tracer, rays / 2, stream(0));
-                    let mut run = Run::new(tracer, light.incident, light.flux, light.tally, stream(1));
+                    let places = if params.textbook { Vec::new() } else { vec![None; sides] };
+                    let nothing = start(vec![DVec3::ZERO; sides], places);
+                    let light = emit::shoot_all(tracer, rays / 2, nothing, stream(0));
+                    let mut run = Run::new(tracer, light.arrived, light.flux, light.tally, stream(1));
                     run.shots += light.shots;
                     run
                 }
@@ -335,6 +352,8 @@ impl Average {
                     let area = patches.open_area((2 * patch + k) as u32);
                     let factor = optics.reflectance[patch].as_dvec3() * (scale / area);
                     solution.radiosity[k] = (factor * (a + b)).as_vec3();
+                    solution.uneven[k] =
+                        (optics.reflectance[patch].as_dvec3() / area * self.uneven[2 * patch + k]).as_vec3();
                     solution.deviation[k] = ((factor * (a - b)).element_sum() / 3.0).abs() as f32;
                 }
                 solution

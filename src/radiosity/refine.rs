@@ -3,6 +3,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::arrived::Arrived;
 use super::ledger::{Ledger, Tally};
 use super::shoot::{Shot, Tracer};
 use crate::error::{Error, Result};
@@ -58,7 +59,7 @@ pub(super) struct Run<'a> {
     /// Light from light sources that arrived.
     direct: Vec<DVec3>,
     /// All light that arrived.
-    incident: Vec<DVec3>,
+    arrived: Arrived,
     /// Reflected light that was shot.
     shot: Vec<DVec3>,
     /// The sum of it.
@@ -78,10 +79,10 @@ pub(super) struct Run<'a> {
 }
 
 impl<'a> Run<'a> {
-    /// Starts from `direct` light on each side; `emitted` of it left the light sources and `tally` is what else became of
+    /// Starts from direct light that `arrived`; `emitted` of it left the light sources and `tally` is what else became of
     /// that.
-    pub fn new(tracer: &'a Tracer<'a>, direct: Vec<DVec3>, emitted: DVec3, tally: Tally, stream: u32) -> Self {
-        let incident = direct.clone();
+    pub fn new(tracer: &'a Tracer<'a>, arrived: Arrived, emitted: DVec3, tally: Tally, stream: u32) -> Self {
+        let direct = arrived.flux.clone();
         let shot = vec![DVec3::ZERO; direct.len()];
         let (mut all, mut relevant) = (0.0, 0.0);
         for (patch, sides) in direct.chunks(2).enumerate() {
@@ -92,7 +93,7 @@ impl<'a> Run<'a> {
         Run {
             tracer,
             direct,
-            incident,
+            arrived,
             shot,
             all_shot: DVec3::ZERO,
             emitted,
@@ -115,13 +116,13 @@ impl<'a> Run<'a> {
     }
 
     fn unshot(&self, side: usize) -> DVec3 {
-        self.reflectance(side) * self.incident[side] - self.shot[side]
+        self.reflectance(side) * self.arrived.flux[side] - self.shot[side]
     }
 
     /// Energy balance.
     pub fn ledger(&self) -> Ledger {
         let (mut absorbed, mut unshot) = (self.tally.lost - self.tally.passed_on, DVec3::ZERO);
-        for (side, incident) in self.incident.iter().enumerate() {
+        for (side, incident) in self.arrived.flux.iter().enumerate() {
             absorbed += (1.0 - self.reflectance(side)) * incident;
             unshot += self.unshot(side);
         }
@@ -141,7 +142,7 @@ impl<'a> Run<'a> {
 
     /// Finds out what is unshot now.
     pub fn survey(&self, unshot: &mut Unshot) {
-        unshot.importance.resize(self.incident.len(), 0.0);
+        unshot.importance.resize(self.arrived.flux.len(), 0.0);
         let of_job = |(job, importance): (usize, &mut [f32])| {
             let (mut flux, mut relevant) = (DVec3::ZERO, 0.0);
             for (side, importance) in (job * SIDES_OF_A_JOB..).zip(importance) {
@@ -204,13 +205,14 @@ impl<'a> Run<'a> {
 
     /// One batch of shots, with `density` rays for each unit of importance. Returns their importance.
     pub fn step(&mut self, unshot: &Unshot, density: f64) -> f64 {
-        let (shots, importance) = self.next_shots(unshot, density);
-        for shot in &shots {
+        let (mut shots, importance) = self.next_shots(unshot, density);
+        for shot in &mut shots {
             let side = shot.side as usize;
+            shot.from = self.arrived.take_places(shot.side);
             self.all_shot += self.unshot(side);
-            self.shot[side] = self.reflectance(side) * self.incident[side];
+            self.shot[side] = self.reflectance(side) * self.arrived.flux[side];
         }
-        let tally = self.tracer.shoot(&shots, &mut self.incident);
+        let tally = self.tracer.shoot(&shots, &mut self.arrived);
         self.tally.add(&tally);
         self.shots += shots.len() as u64;
         importance
@@ -228,7 +230,7 @@ impl<'a> Run<'a> {
             sum += importance;
             let rays = (importance * density).round().clamp(1.0, u32::MAX.into()) as u32;
             let stream = sampling::hash_all(&[self.stream, side, (self.shots + shots.len() as u64) as u32]);
-            shots.push(Shot { side, rays, flux: self.unshot(side as usize) / f64::from(rays), stream });
+            shots.push(Shot { side, rays, flux: self.unshot(side as usize) / f64::from(rays), stream, from: None });
         }
         (shots, sum)
     }
@@ -255,18 +257,18 @@ impl<'a> Run<'a> {
     /// removes the mean of the truncation error (Cohen et al. 1988 spread it evenly; that would light sealed rooms).
     pub fn incident(&self, ambient: bool) -> Vec<DVec3> {
         if !ambient {
-            return self.incident.clone();
+            return self.arrived.flux.clone();
         }
         let mut unshot = Unshot::default();
         self.survey(&mut unshot);
         let mut lost = self.tally.escaped - self.tally_direct.escaped + self.tally.lost
             - self.tally_direct.lost
             - (self.tally.passed_on - self.tally_direct.passed_on);
-        for (side, (incident, direct)) in self.incident.iter().zip(&self.direct).enumerate() {
+        for (side, (incident, direct)) in self.arrived.flux.iter().zip(&self.direct).enumerate() {
             lost += (1.0 - self.reflectance(side)) * (incident - direct);
         }
         let unshot = unshot.flux * self.relevant_unshot(&unshot);
         let factor = DVec3::from_array(std::array::from_fn(|c| if lost[c] > 0.0 { unshot[c] / lost[c] } else { 0.0 }));
-        self.incident.iter().zip(&self.direct).map(|(i, d)| i + factor * (i - d)).collect()
+        self.arrived.flux.iter().zip(&self.direct).map(|(i, d)| i + factor * (i - d)).collect()
     }
 }

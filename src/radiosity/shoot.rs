@@ -7,6 +7,7 @@ use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::RadiosityScene;
+use super::arrived::{Arrived, Place, Places};
 use super::ledger::Tally;
 use super::optics::Optics;
 use super::patches::Patches;
@@ -25,7 +26,7 @@ const MAX_CHAIN: usize = 32;
 const ROULETTE: f32 = 0.25;
 
 /// Light of one patch side that is shot with equal shares over a number of rays.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Shot {
     /// The side.
     pub side: u32,
@@ -35,6 +36,8 @@ pub(super) struct Shot {
     pub flux: DVec3,
     /// Stream of low-discrepancy points.
     pub stream: u32,
+    /// Where the light leaves from: where it arrived. `None`: from everywhere alike.
+    pub from: Option<Places>,
 }
 
 /// What a ray carries.
@@ -127,7 +130,8 @@ struct Scratch {
 
 #[derive(Default)]
 struct Output {
-    deposits: Vec<(u32, DVec3)>,
+    /// Sides, light, and where it arrived.
+    deposits: Vec<(u32, DVec3, Place)>,
     tally: Tally,
 }
 
@@ -137,8 +141,8 @@ pub(super) fn side_normal(point: &SurfacePoint, side: u32) -> Vec3 {
 }
 
 impl Tracer<'_> {
-    /// Shoots `shots` and adds the flux that arrives to `incident`, one entry a side.
-    pub fn shoot(&self, shots: &[Shot], incident: &mut [DVec3]) -> Tally {
+    /// Shoots `shots` and adds the light that arrives to `arrived`.
+    pub fn shoot(&self, shots: &[Shot], arrived: &mut Arrived) -> Tally {
         let mut ends = Vec::with_capacity(shots.len());
         let mut total = 0;
         for shot in shots {
@@ -155,24 +159,27 @@ impl Tracer<'_> {
                 let shot = &shots[at];
                 let index = u64::from(shot.rays) - (ends[at] - k);
                 let s = sampling::sobol(index as u32, 0, shot.stream);
-                let point = self.patches.open_point(geometry, shot.side, [s[0], s[1]]);
+                let point = match &shot.from {
+                    Some(places) => self.patches.point_at(geometry, places.choose(s[0])),
+                    None => self.patches.open_point(geometry, shot.side, [s[0], s[1]]),
+                };
                 let local = sampling::cosine_hemisphere(Vec2::new(s[2], s[3]));
                 let direction = sampling::basis(side_normal(&point, shot.side)) * local;
                 let id = u64::from(shot.stream) << 32 | index;
                 photons.push(Ray::new(point.ray_origin(direction), direction), Load::new(shot.flux, id));
             }
         };
-        self.trace(total, &emit, Deposit::All, incident)
+        self.trace(total, &emit, Deposit::All, arrived)
     }
 
-    /// Traces the photons `0..count`, which `emit` makes, and adds what arrives to `incident`. The result does not depend on the
+    /// Traces the photons `0..count`, which `emit` makes, and adds what arrives to `arrived`. The result does not depend on the
     /// number of threads: chunks have a fixed size and are added up in order.
     pub fn trace(
         &self,
         count: u64,
         emit: &(impl Fn(Range<u64>, &mut Photons) + Sync),
         deposit: Deposit,
-        incident: &mut [DVec3],
+        arrived: &mut Arrived,
     ) -> Tally {
         let mut tally = Tally::default();
         let chunks = count.div_ceil(CHUNK);
@@ -186,8 +193,8 @@ impl Tracer<'_> {
                 })
                 .collect();
             for output in outputs {
-                for (side, flux) in output.deposits {
-                    incident[side as usize] += flux;
+                for (side, flux, place) in output.deposits {
+                    arrived.add(side, flux, place);
                 }
                 tally.add(&output.tally);
             }
@@ -222,7 +229,7 @@ impl Tracer<'_> {
                 let patch = self.patches.map.at(hit.triangle, hit.u, hit.v);
                 if counts {
                     let front = ray.direction.dot(self.patches.planes[hit.triangle as usize].normal) < 0.0;
-                    output.deposits.push((2 * patch + u32::from(!front), load.flux));
+                    output.deposits.push((2 * patch + u32::from(!front), load.flux, Place::met(hit)));
                 }
                 if self.optics.specular[patch as usize]
                     && let Some((ray, load)) = self.pass_on(patch, hit, ray.direction, load, depth as u32)

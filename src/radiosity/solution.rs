@@ -36,6 +36,8 @@ pub struct Solution {
 pub(super) struct PatchSolution {
     /// Radiosity without emission, W/m^2.
     pub radiosity: [Vec3; 2],
+    /// The part of `radiosity` that came straight from light sources, where that varies over the patch; 0 where it hardly does.
+    pub uneven: [Vec3; 2],
     /// Standard error of the mean over bands of `radiosity`.
     pub deviation: [f32; 2],
     /// Diameter.
@@ -59,6 +61,12 @@ impl Solution {
     /// (counter-clockwise) or back side.
     pub fn radiosity(&self, triangle: u32, u: f32, v: f32, front: bool) -> Vec3 {
         self.at(triangle, u, v).radiosity[usize::from(!front)]
+    }
+
+    /// The part of [`Solution::radiosity`] that came straight from light sources, W/m^2, where the patch's mean says little of a point of it:
+    /// where it lies partly in shadow, or close to a light source. 0 elsewhere, and everywhere with [`DirectLight::Shoot`](super::DirectLight).
+    pub fn uneven(&self, triangle: u32, u: f32, v: f32, front: bool) -> Vec3 {
+        self.at(triangle, u, v).uneven[usize::from(!front)]
     }
 
     /// Whether a ray into `direction` meets the front of a triangle of the geometry.

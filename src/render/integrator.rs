@@ -21,7 +21,7 @@ use std::time::Instant;
 use glam::Vec3;
 
 use super::film::{Feature, Tile};
-use super::path::{Arrival, Met, Passes, Path, Shadow};
+use super::path::{Arrival, LookUp, Met, Passes, Path, Shadow};
 use super::view::ViewRays;
 use super::workspace::Workspace;
 use super::world::{Batch, Captured, FarField, World};
@@ -279,23 +279,24 @@ impl World<'_> {
             ws.lores[path.trial as usize] += path.throughput * far.reflected(hit, path.ray.direction);
             return;
         };
-        if !near && far.plain[hit.triangle as usize] {
-            ws.lores[path.trial as usize] += path.throughput * far.reflected(hit, path.ray.direction);
+        let look_up = (!near).then(|| far.look_up(hit, path.ray.direction));
+        if let Some(LookUp { radiance, unlit: false }) = look_up
+            && far.plain[hit.triangle as usize]
+        {
+            ws.lores[path.trial as usize] += path.throughput * radiance;
             return;
         }
         // The triangle is the same one in the detailed scene.
-        let look_up = (!near).then_some(hit.triangle);
         self.meet(ws, index, &Hit { triangle, ..*hit }, look_up, passes, capture);
     }
 
-    /// A ray met a surface of the scene. `look_up`: what is weakly directional there comes from the radiosity of this triangle
-    /// of the simplified geometry.
+    /// A ray met a surface of the scene. `look_up`: what is weakly directional there comes from the radiosity solution.
     fn meet(
         &self,
         ws: &mut Workspace,
         index: u32,
         hit: &Hit,
-        look_up: Option<u32>,
+        look_up: Option<LookUp>,
         passes: Passes,
         capture: &mut Option<&mut Vec<Captured>>,
     ) {
@@ -307,7 +308,7 @@ impl World<'_> {
             (true, None) => 0.0,
         };
         let wanted = if path.gathers { passes.lores } else { passes.hires };
-        let lit = look_up.is_none() && wanted && path.depth < self.max_depth && !self.lights.is_empty();
+        let lit = look_up.is_none_or(|l| l.unlit) && wanted && path.depth < self.max_depth && !self.lights.is_empty();
         let lit = lit.then(|| {
             let [choice, u, v, _] = path.random(0);
             let normal = point.shading_normal_towards(-path.ray.direction);
@@ -383,11 +384,11 @@ impl World<'_> {
 
         // What remains of the point where photons bring the light that the rest of it bends.
         let unbending = match self.caustics {
-            Some(caustics) if path.gathers => caustics.unbending(self.scene, point, outgoing),
+            Some(caustics) if path.gathers && look_up.is_none() => caustics.unbending(self.scene, point, outgoing),
             _ => None,
         };
         // Paths from rough reflection have a share in light sources where nothing is interpolated.
-        let shares = path.gathers && unbending.is_none();
+        let shares = path.gathers && unbending.is_none() && look_up.is_none();
         if let (Some(light), Some(guided)) = (light, met.lit) {
             let scattered = self.scattered(&bsdf, unbending.as_ref(), shares, light);
             shine(ws, &path, point, scattered, light, guided);
@@ -440,8 +441,8 @@ impl World<'_> {
             return;
         }
         let throughput = path.throughput / (1.0 - choose_high);
-        if let (Some(triangle), Some(far)) = (look_up, &self.far) {
-            ws.lores[trial] += throughput * far.reflected(&Hit { triangle, ..*hit }, path.ray.direction);
+        if let Some(look_up) = look_up {
+            ws.lores[trial] += throughput * look_up.radiance;
             return;
         }
         if !goes_on {

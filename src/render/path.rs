@@ -108,6 +108,15 @@ pub struct Shadow {
     pub guided: Guided,
 }
 
+/// What the radiosity solution says of a point of the far field.
+#[derive(Clone, Copy, Debug)]
+pub struct LookUp {
+    /// Reflected radiance, W/(sr m^2).
+    pub radiance: Vec3,
+    /// Whether direct light is not in it and is to be sampled at the point.
+    pub unlit: bool,
+}
+
 /// Where a path's ray met a surface of the scene.
 #[derive(Clone, Copy, Debug)]
 pub struct Met {
@@ -115,8 +124,8 @@ pub struct Met {
     pub path: u32,
     /// The hit.
     pub hit: Hit,
-    /// The triangle of the simplified geometry from whose radiosity comes what is weakly directional there.
-    pub look_up: Option<u32>,
+    /// What radiosity says is weakly directional there, where it is not worked out.
+    pub look_up: Option<LookUp>,
     /// The point.
     pub point: SurfacePoint,
     /// Whether its light is sampled, and how the random numbers for that came about.

@@ -7,7 +7,7 @@ use glam::Vec3;
 use super::cache::IrradianceCache;
 use super::caustics::Caustics;
 use super::nearness::Nearness;
-use super::path::{Passes, Path};
+use super::path::{LookUp, Passes, Path};
 use crate::backend::{Hit, RayScene};
 use crate::lighting::Lights;
 use crate::radiosity::Solution;
@@ -81,6 +81,17 @@ impl FarField<'_> {
     pub fn reflected(&self, hit: &Hit, direction: Vec3) -> Vec3 {
         let front = self.solution.is_front(hit.triangle, direction);
         self.solution.radiosity(hit.triangle, hit.u, hit.v, front) * FRAC_1_PI
+    }
+
+    /// What is used of that: without direct light where the patch's mean says little of this very point. PMM uses all of it everywhere.
+    pub fn look_up(&self, hit: &Hit, direction: Vec3) -> LookUp {
+        let all = self.reflected(hit, direction);
+        if self.r_thresh <= 0.0 {
+            return LookUp { radiance: all, unlit: false };
+        }
+        let front = self.solution.is_front(hit.triangle, direction);
+        let uneven = self.solution.uneven(hit.triangle, hit.u, hit.v, front);
+        LookUp { radiance: all - uneven * FRAC_1_PI, unlit: uneven != Vec3::ZERO }
     }
 }
 

@@ -291,7 +291,7 @@ pub fn simplify_params(r_thresh: f64, beta: f64, box_fit: BoxFit) -> SimplifyPar
 pub fn one_patch(error: f64, seed: u32) -> RadiosityParams {
     RadiosityParams {
         unshot: 1e-4,
-        leave_out_covered: false,
+        textbook: true,
         direct: DirectLight::Shoot,
         error: error as f32,
         seed,

@@ -24,6 +24,7 @@ use crate::simplify::{Cluster, SimplifiedGeometry, TriangleSource};
 use charts::{Charts, Frame};
 use exposure::Exposure;
 use grid::Grid;
+pub(super) use sampling::inset;
 
 const NONE: u32 = u32::MAX;
 

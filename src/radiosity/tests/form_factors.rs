@@ -11,9 +11,10 @@ fn form_factor(room: &Room, rays: u32, seed: u32) -> f64 {
     let patches = Patches::new(&room.geometry, &[], &RadiosityParams::new(1e9)).unwrap();
     let optics = Optics::new(&room.input(), &patches).unwrap();
     let tracer = Tracer { input: &room.input(), patches: &patches, optics: &optics };
-    let mut incident = vec![DVec3::ZERO; 2 * patches.len()];
+    let mut arrived = Arrived::new(vec![DVec3::ZERO; 2 * patches.len()], Vec::new(), 0, 0);
     let flux = DVec3::splat(1.0 / f64::from(rays));
-    tracer.shoot(&[Shot { side: 0, rays, flux, stream: seed }], &mut incident);
+    tracer.shoot(&[Shot { side: 0, rays, flux, stream: seed, from: None }], &mut arrived);
+    let incident = arrived.flux;
     assert_eq!(incident[0].x + incident[1].x, 0.0, "a ray met its own plane");
     let second = room.scene.mesh.objects[1].triangles.start;
     let patch = patches.map.at(second, 0.3, 0.3) as usize;

@@ -157,7 +157,14 @@ fn closed_box(size: [f32; 3], rho: [f32; 6], exitance: [f32; 6]) -> Room {
 
 /// One patch a face, light sources shoot. A tolerance of 5e-3 is five standard errors.
 fn one_patch() -> RadiosityParams {
-    RadiosityParams { unshot: 1e-4, direct: DirectLight::Shoot, error: 1e-3, seed: 1, ..RadiosityParams::new(1e6) }
+    RadiosityParams {
+        textbook: true,
+        unshot: 1e-4,
+        direct: DirectLight::Shoot,
+        error: 1e-3,
+        seed: 1,
+        ..RadiosityParams::new(1e6)
+    }
 }
 
 fn assert_close(what: &str, value: f64, expected: f64, relative: f64) {
