@@ -217,7 +217,7 @@ pub(super) fn run(options: &Options, range: Range, progress: &Progress) -> Resul
 
     let all_views = animation.all_views()?;
     let cameras: Vec<Camera> = all_views.iter().map(|(camera, _)| camera.clone()).collect();
-    let settings = automatic(&animation.scene, &cameras, options.method.settings())?;
+    let settings = automatic(&animation.scene, &cameras, options.settings())?;
     let is_static = animation.is_static()?;
     let mut stage = Stage { animation: &animation, cameras: &cameras, settings, at: None };
     let mut start = Some(start);

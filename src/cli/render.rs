@@ -18,7 +18,7 @@ use crate::clock::Stopwatch;
 use crate::error::{Error, Result};
 use crate::image::Metadata;
 use crate::pipeline::identity::identity;
-use crate::pipeline::{Method, Prepared, Stats, choose_camera_among};
+use crate::pipeline::{Method, Prepared, Settings, Stats, choose_camera_among};
 use crate::progress::Progress;
 use crate::render::checkpoint::LateIdentity;
 use crate::render::film::Pixel;
@@ -154,7 +154,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     // Before the preparation, which may take long: a checkpoint of something else is noticed at once.
     let keep = |(view, params)| options.keep(&scene, &cameras, view, params);
     let kept = views.iter().zip(&params).map(keep).collect::<Result<Vec<_>>>()?;
-    let prepared = Prepared::for_cameras(scene, &cameras, options.method.settings(), &progress, &mut stats)?;
+    let prepared = Prepared::for_cameras(scene, &cameras, options.settings(), &progress, &mut stats)?;
     for warning in &stats.warnings {
         log::warn!("{warning}");
     }
@@ -248,7 +248,7 @@ impl Options {
         view: &View,
         params: &RenderParams,
     ) -> Result<Option<Checkpoint>> {
-        let (scene, settings, params) = (Arc::clone(scene), self.method.settings(), params.clone());
+        let (scene, settings, params) = (Arc::clone(scene), self.settings(), params.clone());
         let (cameras, camera) = (cameras.to_vec(), view.camera.clone());
         let identity = LateIdentity::new(move || identity(&scene, &cameras, &camera, &settings, &params));
         self.long.keep(&view.outputs[0], view.checkpoint.as_deref(), identity)
@@ -317,6 +317,21 @@ impl Options {
         self.output.write(&view.outputs, &developed, &metadata(stats))
     }
 
+    /// Whether the paper's rule alone decides: where one of its errors is named.
+    fn is_by_pixel(&self) -> bool {
+        self.error.is_none() && (self.hires_error.is_some() || self.lores_error.is_some())
+    }
+
+    /// Error of the image that trials are planned for; infinite for none.
+    fn asked_error(&self) -> f32 {
+        if self.is_by_pixel() || self.spp.is_some() { f32::INFINITY } else { self.error.unwrap_or(ERROR) }
+    }
+
+    /// What the scene is prepared with.
+    pub(super) fn settings(&self) -> Settings {
+        Settings { radiosity_error: Settings::radiosity_error_for(self.asked_error()), ..self.method.settings() }
+    }
+
     pub(super) fn render_params(&self, camera: &Camera) -> Result<RenderParams> {
         let aspect = camera.aspect.unwrap_or(16.0 / 9.0);
         let (width, height) = match (self.width, self.height) {
@@ -325,10 +340,8 @@ impl Options {
             (None, Some(h)) => ((h as f32 * aspect).round().max(1.0) as u32, h),
             (None, None) => (1280, (1280.0 / aspect).round().max(1.0) as u32),
         };
-        // The paper's rule alone, where one of its errors is named.
-        let by_pixel = self.error.is_none() && (self.hires_error.is_some() || self.lores_error.is_some());
-        let error = if by_pixel || self.spp.is_some() { f32::INFINITY } else { self.error.unwrap_or(ERROR) };
-        let worst = if by_pixel { PIXEL_ERROR } else { WORST_PIXEL * error };
+        let error = self.asked_error();
+        let worst = if self.is_by_pixel() { PIXEL_ERROR } else { WORST_PIXEL * error };
         let (hires_error, lores_error) = (self.hires_error.unwrap_or(worst), self.lores_error.unwrap_or(worst));
         let (min_trials, max_trials) = self.spp.map_or((self.min_trials, self.max_trials), |n| (n, n));
         let refuse = |what: &str| Err(Error::Usage(what.to_owned()));

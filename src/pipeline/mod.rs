@@ -315,7 +315,9 @@ impl Settings {
             error: self.radiosity_error,
             seed: self.seed,
             ambient: true,
-            textbook: false,
+            leave_out_covered: true,
+            // PMM and radiosity shown directly are the paper's.
+            keep_places: self.method == Method::Gsii && !self.complete_geometry(),
             max_patches: 400_000,
         }
     }

@@ -24,9 +24,9 @@ const PILOT_FAR: u32 = 2;
 const LEAST: [u32; 2] = [4, 1];
 /// Most samples of a side.
 const MOST: u32 = 1 << 14;
-/// Relative variance of single samples above which the direct light of a side counts as uneven: as much as when a twentieth of the light
-/// is hidden from a part of the side.
-const UNEVEN: f64 = 0.05;
+/// Relative standard deviation of single samples, in units of the error that direct light is gathered to, above which the direct light of a
+/// side counts as uneven.
+const UNEVEN: f64 = 10.0;
 /// Relevance below which a side hardly matters.
 const FAR: f64 = 0.05;
 /// Sides looked at by one job.
@@ -67,9 +67,9 @@ struct Estimate {
 }
 
 impl Estimate {
-    /// Whether single samples differ much from each other.
-    fn is_uneven(&self) -> bool {
-        self.variance > UNEVEN * self.mean.element_sum().powi(2)
+    /// Whether single samples have a larger relative standard deviation than `limit`.
+    fn is_uneven(&self, limit: f64) -> bool {
+        self.variance > (limit * self.mean.element_sum()).powi(2)
     }
 }
 
@@ -123,7 +123,7 @@ pub(super) fn gather(input: &RadiosityScene<'_>, patches: &Patches, places: bool
         incident: [a, b],
         places: [at_a, at_b],
         // By the pilot, for the same reason: of sides whose own samples miss a patch of sunlight, all would stay dark.
-        uneven: pilot.iter().map(Estimate::is_uneven).collect(),
+        uneven: pilot.iter().map(|e| e.is_uneven(UNEVEN * target)).collect(),
         error: if flux > 0.0 { expected / flux } else { 0.0 },
         rays,
     }

@@ -53,10 +53,13 @@ pub struct RadiosityParams {
     /// Whether the effect of the unshot flux is estimated and added at the end. Without it radiosities are too low: in a
     /// closed room of reflectance rho by rho times the unshot share.
     pub ambient: bool,
-    /// Whether a patch is as in the textbooks: its whole area, lit and shining evenly. That is what form factors assume: too dark where furniture
-    /// stands against a wall, and light spreads over each patch that it meets. Otherwise parts that something covers closely (within a
-    /// tenth of the diameter) are left out, and reflected light leaves from where it arrived.
-    pub textbook: bool,
+    /// Whether parts of a patch that something covers closely (within a tenth of its diameter) are left out of it. Without that a patch
+    /// is its whole area, as in the textbooks' form factors: exact for large patches that meet at an angle, too dark where furniture
+    /// stands against a wall.
+    pub leave_out_covered: bool,
+    /// Whether reflected light leaves a patch from points where it arrived. Without that it leaves from everywhere alike, as the textbooks' form
+    /// factors have it: light spreads over each patch that it meets, and through walls that patches reach beyond.
+    pub keep_places: bool,
     /// How direct light reaches the patches.
     pub direct: DirectLight,
     /// Relative statistical error to aim for: decides how many rays are shot.
@@ -79,7 +82,8 @@ impl RadiosityParams {
             max_patches: 400_000,
             unshot: 0.01,
             ambient: true,
-            textbook: false,
+            leave_out_covered: true,
+            keep_places: true,
             direct: DirectLight::Gather,
             error: 0.02,
             focus: None,
@@ -150,8 +154,11 @@ pub struct RadiosityScene<'a> {
     pub rays: &'a dyn RayScene,
 }
 
-/// Rays of the first solution for each lit side, in proportion to its relevance: enough to estimate the error.
-const FIRST_RAYS: f64 = 4.0;
+/// Rays of the first solution for each lit side, in proportion to its relevance: most, which are enough to estimate the error, and fewest
+/// where a large one is asked for.
+const FIRST_RAYS: [f64; 2] = [4.0, 1.5];
+/// Error that the most usually come to.
+const FIRST_ERROR: f64 = 0.15;
 /// Fewest rays that the light of the first bounce is shot with.
 const LEAST_RAYS: u64 = 1 << 13;
 /// Fewest and most points of a side that its light leaves from.
@@ -187,7 +194,7 @@ pub fn solve(input: &RadiosityScene<'_>, params: &RadiosityParams, progress: &Pr
         ));
     }
     if !input.lights.is_empty() && patches.len() > 0 {
-        if !params.textbook {
+        if params.leave_out_covered {
             patches.leave_out_covered(input, params.seed);
         }
         if let Some(focus) = &params.focus {
@@ -231,7 +238,7 @@ impl Average {
         let target = f64::from(params.error);
         let direct = match params.direct {
             DirectLight::Gather => {
-                Some(direct::gather(tracer.input, tracer.patches, !params.textbook, params.seed, 0.5 * target))
+                Some(direct::gather(tracer.input, tracer.patches, params.keep_places, params.seed, 0.5 * target))
             }
             DirectLight::Shoot => None,
         };
@@ -249,7 +256,8 @@ impl Average {
         };
         // Direct light is gathered once; more shooting does not reduce its error.
         let of_direct = direct.as_ref().map_or(0.0, |d| d.error).min(0.9 * target);
-        let mut rays = ((FIRST_RAYS * lit) as u64).max(LEAST_RAYS);
+        let first = (FIRST_RAYS[0] * (FIRST_ERROR / target).powf(1.6)).clamp(FIRST_RAYS[1], FIRST_RAYS[0]);
+        let mut rays = ((first * lit) as u64).max(LEAST_RAYS);
         let mut total = 0;
         for round in 0..MAX_ROUNDS {
             self.add_pair(tracer, params, direct.as_ref(), rays, round, progress)?;
@@ -303,7 +311,7 @@ impl Average {
                     Run::new(tracer, arrived, emitted, tally, stream(1))
                 }
                 None => {
-                    let places = if params.textbook { Vec::new() } else { vec![None; sides] };
+                    let places = if params.keep_places { vec![None; sides] } else { Vec::new() };
                     let nothing = start(vec![DVec3::ZERO; sides], places);
                     let light = emit::shoot_all(tracer, rays / 2, nothing, stream(0));
                     let mut run = Run::new(tracer, light.arrived, light.flux, light.tally, stream(1));

@@ -25,20 +25,21 @@ pub enum Crossing {
 
 /// When `errors` of a run fall below `level`; core seconds, preparation included.
 pub fn crossing(record: &Record, level: f64, errors: impl Fn(&Point) -> Option<Errors>) -> Crossing {
-    crossing_after(record, level, record.preparation.all.cpu, |_| 1.0, errors)
+    crossing_after(record, level, |p| p.preparation.cpu, |p| p.rendering.cpu, errors)
 }
 
-/// The same for a part of a run: core seconds from `preparation` on and that `share` of the time of rendering.
+/// The same for a part of a run: of preparation and of rendering, so many core seconds for an image.
 pub fn crossing_after(
     record: &Record,
     level: f64,
-    preparation: f64,
-    share: impl Fn(&Point) -> f64,
+    preparation: impl Fn(&Point) -> f64,
+    rendering: impl Fn(&Point) -> f64,
     errors: impl Fn(&Point) -> Option<Errors>,
 ) -> Crossing {
-    let spent = |p: &Point| preparation + share(p) * p.rendering.cpu;
-    let curve: Vec<(f64, Errors)> = record.points.iter().filter_map(|p| Some((spent(p), errors(p)?))).collect();
-    let Some(&(end, last)) = curve.last() else { return Crossing::Unknown };
+    let spent = |p: &Point| (preparation(p), rendering(p));
+    let known: Vec<((f64, f64), Errors)> = record.points.iter().filter_map(|p| Some((spent(p), errors(p)?))).collect();
+    let curve: Vec<(f64, Errors)> = known.iter().map(|&((before, after), e)| (before + after, e)).collect();
+    let Some(&((before, after), last)) = known.last() else { return Crossing::Unknown };
     // From the end: the last time that the curve passes the level is when it stays below.
     if let Some(k) = curve.iter().rposition(|(_, e)| e.rel_mse >= level) {
         if let Some(&(t1, e1)) = curve.get(k + 1) {
@@ -58,7 +59,7 @@ pub fn crossing_after(
     }
     // Beyond the curve, what is noise falls with the number of trials; the bias stays.
     let noise = (last.rel_mse - floor).max(0.0);
-    Crossing::About(preparation + (end - preparation) * noise / (level - floor))
+    Crossing::About(before + after * noise / (level - floor))
 }
 
 /// Where a line through two points in logarithmic axes passes a level.
@@ -100,6 +101,7 @@ mod tests {
     fn record(errors: &[f64], bias: f64) -> Record {
         let point = |(k, rel_mse): (usize, &f64)| Point {
             trials: 2.0,
+            preparation: Spent { wall: 0.0, cpu: 1.0 },
             rendering: Spent { wall: 0.0, cpu: f64::from(1 << k) },
             hires_share: 0.5,
             rays: 0,
@@ -118,7 +120,7 @@ mod tests {
             threads: 1,
             version: String::new(),
             triangles: 0,
-            preparation: Preparation { all: Spent { wall: 0.0, cpu: 1.0 }, ..Preparation::default() },
+            preparation: Preparation::default(),
             points: errors.iter().enumerate().map(point).collect(),
         }
     }

@@ -226,6 +226,6 @@ fn summary(record: &Record) -> String {
         Some(e) if record.role != Role::Scaling => format!("relMSE {:.1e}", e.rel_mse),
         _ => format!("noise {:.1} %", 100.0 * point.noise),
     };
-    let total = record.total(point).cpu;
+    let total = point.total().cpu;
     format!("{}, {}: {error} after {:.0} trials, {total:.1} core seconds", record.scene, record.label, point.trials)
 }

@@ -17,6 +17,9 @@ pub const PAPER_BETA: f32 = 1.0 / TAU;
 /// office has about as many patches as the paper's: 74,924 on normal + complex surfaces, 1124 on normal + simple ones.
 pub const PAPER_PATCHES: (f32, u32) = (0.1, 7);
 
+/// The paper's share of the emitted flux at which radiosity stops.
+pub const PAPER_UNSHOT: f64 = 0.01;
+
 /// Longest cluster in units of `r_thresh`: the paper's are pieces of furniture, of any length.
 pub const PAPER_CLUSTERS: f32 = 3.0;
 
@@ -116,12 +119,6 @@ impl Run {
         key(&format!("{} {settings} {what:?}", subject.view()))
     }
 
-    /// Names what the scene is prepared for: runs with the same name differ in their trials only.
-    pub fn preparation_key(&self, subject: &Subject) -> String {
-        let settings = serde_json::Value::Object(self.settings.parameters());
-        key(&format!("{} {settings}", subject.view()))
-    }
-
     /// About what it costs, in trials of one pixel by path tracing: for the estimate of what is left to do.
     pub fn cost(&self, subject: &Subject) -> u64 {
         let pixels = f64::from(subject.size[0]) * f64::from(subject.size[1]);
@@ -170,6 +167,7 @@ pub fn ladder(subject: &Subject, base: &Settings, auto: f32, extent: Extent) -> 
         patch_size: Some(PAPER_PATCHES.0 * subject.length()),
         least_patches: PAPER_PATCHES.1,
         longest_cluster: PAPER_CLUSTERS,
+        unshot: PAPER_UNSHOT,
         ..gsii.clone()
     };
     let as_in_paper = |method| Settings { method, ..paper.clone() };

@@ -31,7 +31,7 @@ pub struct Record {
     pub version: String,
     /// Triangles of the detailed scene.
     pub triangles: u64,
-    /// What came before the first pixel.
+    /// What came before the first pixel of the first image.
     pub preparation: Preparation,
     /// Image after image, each with more trials.
     pub points: Vec<Point>,
@@ -67,6 +67,8 @@ pub struct Preparation {
 pub struct Point {
     /// Trials of each pixel (the mean, where it varies).
     pub trials: f64,
+    /// Time for all that came before the first pixel.
+    pub preparation: Spent,
     /// Time for the passes, preparation not included.
     pub rendering: Spent,
     /// Share of HIRES in that.
@@ -85,14 +87,16 @@ pub struct Point {
     pub indirect: Option<Errors>,
 }
 
-impl Record {
-    /// Time until an image was there, preparation included.
-    pub fn total(&self, point: &Point) -> Spent {
-        let mut all = self.preparation.all;
-        all += point.rendering;
+impl Point {
+    /// Time until the image was there, preparation included.
+    pub fn total(&self) -> Spent {
+        let mut all = self.preparation;
+        all += self.rendering;
         all
     }
+}
 
+impl Record {
     /// The image with the most trials.
     pub fn last(&self) -> Option<&Point> {
         self.points.last()

@@ -146,12 +146,12 @@ fn facts(chapter: &Chapter) -> String {
 fn same_time(records: &[Record]) -> f64 {
     let gsii = records.iter().find(|r| r.role == Role::Gsii);
     let point = gsii.and_then(|r| r.points.iter().find(|p| p.trials >= 16.0).or(r.last()));
-    gsii.zip(point).map_or(0.0, |(r, p)| r.total(p).cpu)
+    gsii.and(point).map_or(0.0, |p| p.total().cpu)
 }
 
 /// The image that was there at about a time.
 fn nearest(run: &Record, time: f64) -> Option<&Point> {
-    let distance = |p: &Point| (run.total(p).cpu / time).ln().abs();
+    let distance = |p: &Point| (p.total().cpu / time).ln().abs();
     run.points.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))
 }
 
@@ -206,7 +206,7 @@ impl<'a> Album<'a> {
         });
         Ok(Figure {
             title: run.label.clone(),
-            caption: format!("{:.0} trials, {:.1} core s{error}", point.trials, run.total(point).cpu),
+            caption: format!("{:.0} trials, {:.1} core s{error}", point.trials, point.total().cpu),
             image: self.photograph(&name, &whole)?,
             difference: Some(data_uri(&path)?),
         })
@@ -245,7 +245,7 @@ fn curves(chapter: &Chapter) -> Vec<(&'static str, String)> {
                 label: run.label.clone(),
                 colour: first + i,
                 minor,
-                points: run.points.iter().filter_map(|p| Some((run.total(p).cpu, y(run, p)?))).collect(),
+                points: run.points.iter().filter_map(|p| Some((p.total().cpu, y(run, p)?))).collect(),
             })
             .collect()
     };

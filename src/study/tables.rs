@@ -3,7 +3,7 @@
 use super::crossing::{Crossing, LEVELS, crossing, crossing_after};
 use super::error::MeanRelative;
 use super::plan::Role;
-use super::record::Record;
+use super::record::{Point, Record};
 use super::table::{Table, number, signed_percent};
 
 /// What a table says of one scene.
@@ -233,9 +233,10 @@ const TWO_PER_CENT: f64 = 4e-4;
 /// neither.
 fn price(chapter: &Chapter<'_>) -> Option<[Crossing; 2]> {
     let run = chapter.run(Role::Gsii)?;
-    let direct = crossing_after(run, TWO_PER_CENT, 0.0, |p| p.hires_share, |p| p.direct);
-    let preparation = run.preparation.all.cpu - run.preparation.build.cpu;
-    let indirect = crossing_after(run, TWO_PER_CENT, preparation, |p| 1.0 - p.hires_share, |p| p.indirect);
+    let rendering = |share: fn(f64) -> f64| move |p: &Point| share(p.hires_share) * p.rendering.cpu;
+    let preparation = |p: &Point| p.preparation.cpu - run.preparation.build.cpu;
+    let direct = crossing_after(run, TWO_PER_CENT, |_| 0.0, rendering(|hires| hires), |p| p.direct);
+    let indirect = crossing_after(run, TWO_PER_CENT, preparation, rendering(|hires| 1.0 - hires), |p| p.indirect);
     Some([direct, indirect])
 }
 
@@ -343,7 +344,7 @@ fn settings(chapters: &[Chapter<'_>]) -> Table {
                 r_thresh,
                 run.preparation.patches.to_string(),
                 run.preparation.clusters.to_string(),
-                number(run.preparation.all.cpu),
+                number(point.preparation.cpu),
                 number(point.trials),
                 number(point.rendering.cpu),
                 format!("{:.1e}", whole.rel_mse),
@@ -401,7 +402,7 @@ pub fn microseconds_per_trial(run: &Record) -> f64 {
 
 /// Core seconds until an image has 10 % noise, preparation included.
 pub fn to_ten_per_cent(run: &Record) -> f64 {
-    run.last().map_or(0.0, |p| run.preparation.all.cpu + p.rendering.cpu * (p.noise / 0.1).powi(2))
+    run.last().map_or(0.0, |p| p.preparation.cpu + p.rendering.cpu * (p.noise / 0.1).powi(2))
 }
 
 /// All tables about scenes with a reference.

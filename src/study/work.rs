@@ -10,7 +10,7 @@ use super::subject::Subject;
 use crate::clock::{Spent, Stopwatch};
 use crate::error::Result;
 use crate::image::{self, Metadata, WriteOptions};
-use crate::pipeline::{Prepared, Stats};
+use crate::pipeline::{Prepared, Settings, Stats};
 use crate::progress::Progress;
 use crate::render::film::PixelSum;
 use crate::render::{Film, LEAST_TRIALS, RayCounts, RenderParams, WORST_PIXEL};
@@ -31,11 +31,26 @@ pub struct Kit {
 }
 
 impl Kit {
-    fn new(key: String, run: &Run, subject: &Subject, progress: &Progress) -> Result<Kit> {
+    /// The kit for `settings`: what is there, if that was made for them.
+    fn fit<'k>(
+        kit: &'k mut Option<Kit>,
+        settings: &Settings,
+        run: &Run,
+        subject: &Subject,
+        progress: &Progress,
+    ) -> Result<&'k mut Kit> {
+        let key = format!("{} {}", subject.view(), serde_json::Value::Object(settings.parameters()));
+        // What was there is given up before its successor needs the memory.
+        Ok(match kit.take().filter(|kit| kit.key == key) {
+            Some(fitting) => kit.insert(fitting),
+            None => kit.insert(Kit::new(key, settings, run, subject, progress)?),
+        })
+    }
+
+    fn new(key: String, settings: &Settings, run: &Run, subject: &Subject, progress: &Progress) -> Result<Kit> {
         let mut stats = Stats::new();
         let watch = Stopwatch::start();
-        let prepared =
-            Prepared::new(subject.scene.clone(), &subject.camera, run.settings.clone(), progress, &mut stats)?;
+        let prepared = Prepared::new(subject.scene.clone(), &subject.camera, settings.clone(), progress, &mut stats)?;
         let all = watch.spent();
         for warning in &stats.warnings {
             log::info!("{}, {}: {warning}", subject.name, run.label);
@@ -57,13 +72,12 @@ pub fn perform(
     kit: &mut Option<Kit>,
     progress: &Progress,
 ) -> Result<Option<Record>> {
-    let preparation_key = run.preparation_key(subject);
-    // What was there is given up before its successor needs the memory.
-    let fitting = kit.take().filter(|kit| kit.key == preparation_key);
-    let Kit { prepared, stats, all, .. } = match fitting {
-        Some(fitting) => kit.insert(fitting),
-        None => kit.insert(Kit::new(preparation_key, run, subject, progress)?),
+    let first = match run.sampling {
+        Sampling::Planned { .. } => settings_for(run, ERRORS[0]),
+        _ => run.settings.clone(),
     };
+    let Kit { prepared, stats, all, .. } = Kit::fit(kit, &first, run, subject, progress)?;
+    let all = *all;
     let key = run.key(subject, reference.map_or(0, |r| r.trials));
     let mut parameters = stats.parameters.clone();
     parameters.insert("pixels".to_owned(), (subject.size[0] * subject.size[1]).into());
@@ -76,20 +90,21 @@ pub fn perform(
         threads: rayon::current_num_threads(),
         version: stats.version.to_owned(),
         triangles: stats.counts.triangles,
-        preparation: preparation(prepared, stats, *all),
+        preparation: preparation(prepared, stats, all),
         points: Vec::new(),
     };
     let keep = Keep { store, subject, reference: reference.map(|r| &r.picture) };
     match run.sampling {
         Sampling::Planned { most } => {
             for asked in ERRORS {
+                let Kit { prepared, all, .. } = Kit::fit(kit, &settings_for(run, asked), run, subject, progress)?;
                 let watch = Stopwatch::start();
                 let image = prepared.render(&subject.camera, &planned(run, subject, most, asked), progress);
                 if image.stopped {
                     break;
                 }
                 let share = image.times.hires_share();
-                let point = keep.point(&record.key, &image.film, watch.spent(), share, image.rays)?;
+                let point = keep.point(&record.key, &image.film, [*all, watch.spent()], share, image.rays)?;
                 let enough = is_enough(run, &point) || point.trials > MOSTLY * f64::from(most);
                 record.points.push(point);
                 if enough {
@@ -104,7 +119,7 @@ pub fn perform(
             prepared.render_rounds(&subject.camera, &params(run, subject, 2, most, 0.0), progress, &mut |round| {
                 rendering += watch.spent();
                 let share = round.times.hires_share();
-                let result = keep.point(&record.key, round.film, rendering, share, round.rays);
+                let result = keep.point(&record.key, round.film, [all, rendering], share, round.rays);
                 match result {
                     Ok(point) => record.points.push(point),
                     Err(error) => failed = Some(error),
@@ -120,7 +135,13 @@ pub fn perform(
             let watch = Stopwatch::start();
             let rendering = prepared.render(&subject.camera, &params(run, subject, 10, 30, 0.05), progress);
             let share = rendering.times.hires_share();
-            record.points.push(keep.point(&record.key, &rendering.film, watch.spent(), share, rendering.rays)?);
+            record.points.push(keep.point(
+                &record.key,
+                &rendering.film,
+                [all, watch.spent()],
+                share,
+                rendering.rays,
+            )?);
         }
     }
     Ok((!progress.stopped()).then_some(record))
@@ -133,6 +154,11 @@ fn is_enough(run: &Run, point: &Point) -> bool {
     let parts = below(point.direct, part) && below(point.indirect, part);
     // Prices of direct and indirect light are asked of GSII only.
     below(point.whole, all) && (run.role != Role::Gsii || parts)
+}
+
+/// As `gsii render --error` prepares a scene.
+fn settings_for(run: &Run, error: f32) -> Settings {
+    Settings { radiosity_error: Settings::radiosity_error_for(error), ..run.settings.clone() }
 }
 
 /// As `gsii render --error` does.
@@ -186,11 +212,14 @@ struct Keep<'a> {
 }
 
 impl Keep<'_> {
-    fn point(&self, key: &str, film: &Film, rendering: Spent, hires_share: f64, rays: RayCounts) -> Result<Point> {
+    /// `spent`: on preparation, and on rendering.
+    fn point(&self, key: &str, film: &Film, spent: [Spent; 2], hires_share: f64, rays: RayCounts) -> Result<Point> {
+        let [preparation, rendering] = spent;
         let pixels = f64::from(film.width) * f64::from(film.height);
         let trials = film.pixels().map(|p| f64::from(p.hires.trials().max(p.lores.trials()))).sum::<f64>() / pixels;
         let mut point = Point {
             trials,
+            preparation,
             rendering,
             hires_share,
             rays: rays.hires() + rays.lores(),

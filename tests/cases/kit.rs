@@ -291,7 +291,8 @@ pub fn simplify_params(r_thresh: f64, beta: f64, box_fit: BoxFit) -> SimplifyPar
 pub fn one_patch(error: f64, seed: u32) -> RadiosityParams {
     RadiosityParams {
         unshot: 1e-4,
-        textbook: true,
+        leave_out_covered: false,
+        keep_places: false,
         direct: DirectLight::Shoot,
         error: error as f32,
         seed,

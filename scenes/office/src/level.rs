@@ -13,10 +13,10 @@ pub fn for_surfaces(surfaces: u64, seed: u32) -> Detail {
     })
 }
 
-/// The level whose number of triangles comes closest.
-pub fn for_triangles(triangles: u64, seed: u32) -> Detail {
-    closest(triangles, (0.001, 1000.0), |level| {
-        let detail = Detail::level(level);
+/// The level whose number of triangles comes closest; with `clutter`, the tessellation of just so many things.
+pub fn for_triangles(triangles: u64, clutter: Option<f32>, seed: u32) -> Detail {
+    closest(triangles, (0.001, 1000.0), |scale| {
+        let detail = clutter.map_or(Detail::level(scale), |clutter| Detail { tessellation: scale, clutter });
         (detail, Office::build(detail, seed).triangle_count())
     })
 }

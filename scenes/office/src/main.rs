@@ -51,12 +51,20 @@ struct Args {
     /// [default: the paper's 10,948 surfaces]
     #[arg(long, value_parser = clap::value_parser!(u64).range(1000..=10_000_000))]
     detail: Option<u64>,
+    /// Amount of small things, 1 as usual: keeps --detail from changing it
+    #[arg(long, value_name = "X", requires = "detail", value_parser = amount)]
+    clutter: Option<f32>,
     /// Seed of everything irregular.
     #[arg(long, default_value_t = 1)]
     seed: u32,
     /// File to write.
     #[arg(short, long, default_value = "office.glb")]
     output: PathBuf,
+}
+
+fn amount(text: &str) -> Result<f32, String> {
+    let amount = text.parse().ok().filter(|x| (0.01..=100.0).contains(x));
+    amount.ok_or_else(|| "must be a number between 0.01 and 100".to_owned())
 }
 
 fn main() -> ExitCode {
@@ -72,7 +80,7 @@ fn main() -> ExitCode {
 fn run(args: &Args) -> Result<(), String> {
     let detail = match args.detail {
         None => level::for_surfaces(level::PAPER_SURFACES, args.seed),
-        Some(triangles) => level::for_triangles(triangles, args.seed),
+        Some(triangles) => level::for_triangles(triangles, args.clutter, args.seed),
     };
     let mut scene = office::Office::build(detail, args.seed);
     let wanted = args.reflectance.rho();

@@ -126,7 +126,7 @@ fn equal_arguments_give_equal_bytes_and_seeds_differ() {
 #[test]
 fn detail_series_grows_in_triangles_and_things() {
     let series: Vec<Scene> = [1_000, 10_000, 100_000, 1_000_000]
-        .map(|triangles| Office::build(level::for_triangles(triangles, 1), 1))
+        .map(|triangles| Office::build(level::for_triangles(triangles, None, 1), 1))
         .into();
     for pair in series.windows(2) {
         assert!(pair[0].triangle_count() < pair[1].triangle_count());
@@ -134,6 +134,16 @@ fn detail_series_grows_in_triangles_and_things() {
         assert!(pair[0].surface_count() < pair[1].surface_count());
     }
     for (scene, wanted) in series.iter().zip([1_000.0, 10_000.0, 100_000.0, 1_000_000.0_f64]) {
+        let ratio = scene.triangle_count() as f64 / wanted;
+        assert!((0.75..1.34).contains(&ratio), "{wanted}: {}", scene.triangle_count());
+    }
+}
+
+#[test]
+fn detail_of_the_same_things_is_tessellation() {
+    let series = [20_000, 200_000, 2_000_000].map(|n| Office::build(level::for_triangles(n, Some(0.3), 1), 1));
+    for (scene, wanted) in series.iter().zip([2e4, 2e5, 2e6]) {
+        assert_eq!(scene.nodes.len(), series[0].nodes.len());
         let ratio = scene.triangle_count() as f64 / wanted;
         assert!((0.75..1.34).contains(&ratio), "{wanted}: {}", scene.triangle_count());
     }

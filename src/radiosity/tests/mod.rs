@@ -158,7 +158,7 @@ fn closed_box(size: [f32; 3], rho: [f32; 6], exitance: [f32; 6]) -> Room {
 /// One patch a face, light sources shoot. A tolerance of 5e-3 is five standard errors.
 fn one_patch() -> RadiosityParams {
     RadiosityParams {
-        textbook: true,
+        keep_places: false,
         unshot: 1e-4,
         direct: DirectLight::Shoot,
         error: 1e-3,
