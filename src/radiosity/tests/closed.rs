@@ -71,6 +71,28 @@ fn rad_005_no_steady_state_or_not_physical() {
     assert_close("absorbed", solution.ledger.absorbed[0], 1.0, 2e-4);
 }
 
+/// Two rooms whose floor, ceiling and side walls are one patch each, with a wall between them: light of one room stays there when it leaves
+/// patches from where it arrived, and goes through the wall where it leaves from everywhere.
+#[test]
+fn light_stays_in_its_room() {
+    for direct in [DirectLight::Gather, DirectLight::Shoot] {
+        for keep_places in [true, false] {
+            let p = Vec3::new;
+            let between = [p(1., 0., 0.), p(1., 0., 1.), p(1., 1., 1.), p(1., 1., 0.)];
+            let mut surfaces: Vec<Surface> =
+                box_faces([2.0, 1.0, 1.0]).map(|face| (diced(face, 1), material(0.5, 0.0))).into();
+            surfaces[0].1 = material(0.5, 1.0);
+            surfaces.push((diced(between, 1), material(0.5, 0.0)));
+            let room = Room::new(surfaces, Vec::new());
+            let params = RadiosityParams { keep_places, direct, error: 0.02, ..one_patch() };
+            let solution = room.solve(&params).unwrap();
+            let beyond = room.surface(&solution, 1).1.x;
+            assert!(if keep_places { beyond == 0.0 } else { beyond > 0.01 }, "{direct:?}, {keep_places}: {beyond}");
+            assert!(room.surface(&solution, 6).1.x > 0.01, "the wall between them is lit");
+        }
+    }
+}
+
 #[test]
 fn rad_006_cube_lit_by_its_ceiling() {
     let room = closed_box([1.0; 3], [0.5; 6], [0.0, 0.0, 0.0, 0.0, 0.0, 1.0]);
