@@ -26,7 +26,7 @@ const LEAST: [u32; 2] = [4, 1];
 const MOST: u32 = 1 << 14;
 /// Relative standard deviation of single samples, in units of the error that direct light is gathered to, above which the direct light of a
 /// side counts as uneven.
-const UNEVEN: f64 = 10.0;
+const UNEVEN: f64 = 20.0;
 /// Relevance below which a side hardly matters.
 const FAR: f64 = 0.05;
 /// Sides looked at by one job.
