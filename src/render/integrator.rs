@@ -384,7 +384,7 @@ impl World<'_> {
 
         // What remains of the point where photons bring the light that the rest of it bends.
         let unbending = match self.caustics {
-            Some(caustics) if path.gathers && look_up.is_none() => caustics.unbending(self.scene, point, outgoing),
+            Some(caustics) if path.gathers => caustics.unbending(self.scene, point, outgoing),
             _ => None,
         };
         // Paths from rough reflection have a share in light sources where nothing is interpolated.
