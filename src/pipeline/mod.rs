@@ -316,7 +316,7 @@ impl Settings {
             seed: self.seed,
             ambient: true,
             leave_out_covered: true,
-            // PMM and radiosity shown directly are the paper's.
+            // PMM and radiosity shown directly are the paper's: light is spread over patches, and all of it is looked up.
             keep_places: self.method == Method::Gsii && !self.complete_geometry(),
             max_patches: 400_000,
         }

@@ -7,6 +7,9 @@ use crate::backend::Hit;
 use crate::sampling;
 use crate::shading::SurfacePoint;
 
+/// Fewest and most points kept of a side.
+const KEPT: [usize; 2] = [16, 256];
+
 /// A point of a side.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Place {
@@ -37,9 +40,10 @@ pub(super) struct Places {
 }
 
 impl Places {
-    /// None yet, and room for `kept`.
-    pub fn new(kept: usize) -> Self {
-        Places { at: vec![Place::default(); kept].into(), flux: 0.0 }
+    /// None yet, and room for `wanted`, as far as that is sensible: about as many as rays arrive or leave. Fewer would make the light of
+    /// large patches uncertain.
+    pub fn new(wanted: usize) -> Self {
+        Places { at: vec![Place::default(); wanted.clamp(KEPT[0], KEPT[1])].into(), flux: 0.0 }
     }
 
     /// Light arrived at `place`; `random` in 0..1 is a number of its own.
@@ -71,17 +75,17 @@ pub(super) struct Arrived {
     pub flux: Vec<DVec3>,
     /// Where it arrived since the side last shot; empty where that is not remembered.
     places: Vec<Option<Places>>,
-    /// Points to keep of a side.
-    kept: usize,
+    /// Points wanted of a side.
+    wanted: usize,
     /// For random numbers.
     stream: u32,
     count: u32,
 }
 
 impl Arrived {
-    /// `flux` on each side, at `places`, where those are remembered: `kept` for each side, from now on.
-    pub fn new(flux: Vec<DVec3>, places: Vec<Option<Places>>, kept: usize, stream: u32) -> Self {
-        Arrived { flux, places, kept, stream, count: 0 }
+    /// `flux` on each side, at `places`, where those are remembered: about `wanted` for each side, from now on.
+    pub fn new(flux: Vec<DVec3>, places: Vec<Option<Places>>, wanted: usize, stream: u32) -> Self {
+        Arrived { flux, places, wanted, stream, count: 0 }
     }
 
     /// Adds light.
@@ -90,7 +94,7 @@ impl Arrived {
         if let Some(places) = self.places.get_mut(side as usize) {
             self.count = self.count.wrapping_add(1);
             let random = sampling::unit(sampling::hash(self.stream ^ self.count));
-            places.get_or_insert_with(|| Places::new(self.kept)).offer(place, flux.element_sum(), random);
+            places.get_or_insert_with(|| Places::new(self.wanted)).offer(place, flux.element_sum(), random);
         }
     }
 
@@ -104,8 +108,6 @@ impl Arrived {
 mod tests {
     use super::*;
 
-    const KEPT: usize = 16;
-
     /// Three points with 1, 2 and 4 parts of the light are chosen that often: 4 standard errors of 16 x 4096 choices that may depend on
     /// each other within a side, false alarms once in 5000 runs (numbers are fixed).
     #[test]
@@ -114,16 +116,16 @@ mod tests {
         for order in [[0, 1, 2], [2, 1, 0], [1, 2, 0]] {
             let mut found = [[0.0_f64; 2]; 3];
             for run in 0..runs {
-                let mut places = Places::new(KEPT);
+                let mut places = Places::new(KEPT[0]);
                 for &triangle in &order {
                     let flux = [1.0, 2.0, 4.0][triangle as usize];
                     let random = sampling::unit(sampling::hash_all(&[run, triangle]));
                     places.offer(Place { triangle, uv: [0.0; 2] }, flux, random);
                 }
                 let mut of_run = [0.0; 3];
-                for k in 0..KEPT {
-                    let u = (k as f32 + 0.5) / KEPT as f32;
-                    of_run[places.choose(u).triangle as usize] += 1.0 / KEPT as f64;
+                for k in 0..KEPT[0] {
+                    let u = (k as f32 + 0.5) / KEPT[0] as f32;
+                    of_run[places.choose(u).triangle as usize] += 1.0 / KEPT[0] as f64;
                 }
                 for (sum, x) in found.iter_mut().zip(of_run) {
                     sum[0] += x;

@@ -7,7 +7,6 @@ use super::RadiosityScene;
 use super::arrived::{Place, Places};
 use super::patches::Patches;
 use super::shoot::side_normal;
-use super::{LEAST_PLACES, MOST_PLACES};
 use crate::backend::{Coherence, Ray};
 use crate::lighting::shadow::{ShadowBuffers, ShadowRay, light_visibility};
 use crate::lighting::{LightSample, Lit};
@@ -38,21 +37,12 @@ pub(super) struct Direct {
     pub incident: [Vec<DVec3>; 2],
     /// Where that arrived, one entry a side; empty where it was not to be remembered.
     pub places: [Vec<Option<Places>>; 2],
-    /// Sides whose samples differ so much that their mean says little of a point.
-    pub uneven: Vec<bool>,
+    /// The mean of `incident` on sides whose samples differ so much that it says little of a point; 0 elsewhere, W.
+    pub uneven: Vec<DVec3>,
     /// Relative error expected of their mean (flux-weighted, as [`Solution::error`](super::Solution::error)).
     pub error: f64,
     /// Shadow rays traced.
     pub rays: u64,
-}
-
-impl Direct {
-    /// Incident flux of the uneven sides; 0 elsewhere, W.
-    pub fn uneven(&self) -> Vec<DVec3> {
-        let [a, b] = &self.incident;
-        let flux = |side: usize| if self.uneven[side] { 0.5 * (a[side] + b[side]) } else { DVec3::ZERO };
-        (0..a.len()).map(flux).collect()
-    }
 }
 
 /// Mean irradiance of a side and the variance of one sample, summed over bands.
@@ -116,14 +106,17 @@ pub(super) fn gather(input: &RadiosityScene<'_>, patches: &Patches, places: bool
         let mut estimates = estimate(input, patches, &counts, places, stream(half));
         rays += estimates.iter().map(|e| e.rays).sum::<u64>();
         let found = if places { estimates.iter_mut().map(|e| e.places.take()).collect() } else { Vec::new() };
-        (estimates.iter().enumerate().map(|(s, e)| area(s) * e.mean).collect(), found)
+        let incident: Vec<DVec3> = estimates.iter().enumerate().map(|(s, e)| area(s) * e.mean).collect();
+        (incident, found)
     });
     let [(a, at_a), (b, at_b)] = halves;
+    // By the pilot, for the same reason: of sides whose own samples miss a patch of sunlight, all would stay dark.
+    let is_uneven = |side: usize| pilot[side].is_uneven(UNEVEN * target);
+    let mean = |side: usize| if is_uneven(side) { 0.5 * (a[side] + b[side]) } else { DVec3::ZERO };
     Direct {
+        uneven: (0..sides).map(mean).collect(),
         incident: [a, b],
         places: [at_a, at_b],
-        // By the pilot, for the same reason: of sides whose own samples miss a patch of sunlight, all would stay dark.
-        uneven: pilot.iter().map(|e| e.is_uneven(UNEVEN * target)).collect(),
         error: if flux > 0.0 { expected / flux } else { 0.0 },
         rays,
     }
@@ -190,10 +183,9 @@ fn estimate(input: &RadiosityScene<'_>, patches: &Patches, counts: &[u32], place
                 estimate.rays += 1;
                 if places && value != DVec3::ZERO {
                     let (side, count) = ((job * JOB) as u32 + k, counts[k as usize]);
-                    let kept = (count as usize).clamp(LEAST_PLACES, MOST_PLACES);
                     let random = sampling::unit(sampling::hash_all(&[stream, side, estimate.rays as u32]));
                     let flux = patches.open_area(side) / f64::from(count) * value.element_sum();
-                    estimate.places.get_or_insert_with(|| Places::new(kept)).offer(place, flux, random);
+                    estimate.places.get_or_insert_with(|| Places::new(count as usize)).offer(place, flux, random);
                 }
                 squares[k as usize] += value.element_sum().powi(2);
             }

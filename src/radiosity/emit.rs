@@ -13,20 +13,18 @@ use crate::sampling;
 use crate::scene::{Mesh, Scene};
 use crate::shading::SurfacePoint;
 
-/// Light on patches that was shot from light sources.
+/// Light that was shot from light sources.
 pub(super) struct Emitted {
-    /// What arrived.
-    pub arrived: Arrived,
     /// Flux that set out.
     pub flux: DVec3,
-    /// What else became of it.
+    /// What became of it, besides arriving.
     pub tally: Tally,
     /// Number of shots.
     pub shots: u64,
 }
 
 /// Shoots all light: emitting patches as any patch, with exactly their flux, and what shines without area or from outside. Uses about `rays` rays.
-pub(super) fn shoot_all(tracer: &Tracer<'_>, rays: u64, mut arrived: Arrived, stream: u32) -> Emitted {
+pub(super) fn shoot_all(tracer: &Tracer<'_>, rays: u64, arrived: &mut Arrived, stream: u32) -> Emitted {
     let area = |side: u32| tracer.patches.open_area(side);
     let punctual = punctual(tracer.input.scene);
     let of_patches: DVec3 = tracer.optics.emission.iter().map(|&(side, exitance)| area(side) * exitance).sum();
@@ -46,20 +44,20 @@ pub(super) fn shoot_all(tracer: &Tracer<'_>, rays: u64, mut arrived: Arrived, st
             Shot { side, rays, flux: flux / f64::from(rays), stream, from: None }
         })
         .collect();
-    let mut tally = tracer.shoot(&shots, &mut arrived);
+    let mut tally = tracer.shoot(&shots, arrived);
     let mut flux = of_patches;
     if !punctual.is_empty() {
         let count = ((importance(of_lights) * density) as u64).max(1024);
         let photons = |range: Range<u64>, photons: &mut Photons| {
             emit(tracer.input.scene, &punctual, range, count, sampling::hash(stream), photons);
         };
-        let of_lights = tracer.trace(count, &photons, Deposit::All, &mut arrived);
+        let of_lights = tracer.trace(count, &photons, Deposit::All, arrived);
         tally.add(&of_lights);
         // Colours of rays differ, so what set out is known only from what became of it.
         let all: DVec3 = arrived.flux.iter().sum();
         flux = all + tally.escaped + tally.lost - tally.passed_on;
     }
-    Emitted { arrived, flux, tally, shots: shots.len() as u64 }
+    Emitted { flux, tally, shots: shots.len() as u64 }
 }
 
 /// Shoots `count` rays from the light sources and keeps what a mirror or a refracting surface has bent: light that shadow rays

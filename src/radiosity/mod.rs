@@ -57,8 +57,9 @@ pub struct RadiosityParams {
     /// is its whole area, as in the textbooks' form factors: exact for large patches that meet at an angle, too dark where furniture
     /// stands against a wall.
     pub leave_out_covered: bool,
-    /// Whether reflected light leaves a patch from points where it arrived. Without that it leaves from everywhere alike, as the textbooks' form
-    /// factors have it: light spreads over each patch that it meets, and through walls that patches reach beyond.
+    /// Whether it is known where on a patch light arrived: reflected light leaves from there, and direct light that varies over a patch is told
+    /// apart ([`Solution::look_up`]). Without that a patch is lit and shines evenly, as the textbooks' form factors have it: light spreads over each
+    /// patch that it meets, and through walls that patches reach beyond.
     pub keep_places: bool,
     /// How direct light reaches the patches.
     pub direct: DirectLight,
@@ -161,9 +162,6 @@ const FIRST_RAYS: [f64; 2] = [4.0, 1.5];
 const FIRST_ERROR: f64 = 0.15;
 /// Fewest rays that the light of the first bounce is shot with.
 const LEAST_RAYS: u64 = 1 << 13;
-/// Fewest and most points of a side that its light leaves from.
-const LEAST_PLACES: usize = 16;
-const MOST_PLACES: usize = 256;
 /// Solutions that may be averaged to reach the error.
 const MAX_ROUNDS: u32 = 4;
 
@@ -236,15 +234,17 @@ impl Average {
     /// shows to be needed.
     fn solve(&mut self, tracer: &Tracer<'_>, params: &RadiosityParams, progress: &Progress) -> Result<()> {
         let target = f64::from(params.error);
-        let direct = match params.direct {
+        let mut direct = match params.direct {
             DirectLight::Gather => {
                 Some(direct::gather(tracer.input, tracer.patches, params.keep_places, params.seed, 0.5 * target))
             }
             DirectLight::Shoot => None,
         };
-        if let Some(direct) = &direct {
+        if let Some(direct) = &mut direct {
             self.rays += direct.rays;
-            self.uneven = direct.uneven();
+            if params.keep_places {
+                self.uneven = std::mem::take(&mut direct.uneven);
+            }
         }
         let relevance = |side: usize| tracer.patches.relevance[side / 2];
         let lit: f64 = match &direct {
@@ -256,6 +256,7 @@ impl Average {
         };
         // Direct light is gathered once; more shooting does not reduce its error.
         let of_direct = direct.as_ref().map_or(0.0, |d| d.error).min(0.9 * target);
+        // As below: the variance to the power of 0.8.
         let first = (FIRST_RAYS[0] * (FIRST_ERROR / target).powf(1.6)).clamp(FIRST_RAYS[1], FIRST_RAYS[0]);
         let mut rays = ((first * lit) as u64).max(LEAST_RAYS);
         let mut total = 0;
@@ -297,9 +298,7 @@ impl Average {
         let sides = 2 * tracer.patches.len();
         let solution = |half: usize, progress: &Progress| {
             let stream = |what: u32| sampling::hash_all(&[params.seed, round, half as u32, what]);
-            // As many as rays that leave a side, about: fewer would make the light of large patches uncertain.
-            let kept = (rays as usize / sides).clamp(LEAST_PLACES, MOST_PLACES);
-            let start = |flux, places| Arrived::new(flux, places, kept, stream(2));
+            let start = |flux, places| Arrived::new(flux, places, rays as usize / sides, stream(2));
             let mut run = match gathered {
                 Some(gathered) => {
                     let mut arrived = start(gathered.incident[half].clone(), gathered.places[half].clone());
@@ -312,9 +311,9 @@ impl Average {
                 }
                 None => {
                     let places = if params.keep_places { vec![None; sides] } else { Vec::new() };
-                    let nothing = start(vec![DVec3::ZERO; sides], places);
-                    let light = emit::shoot_all(tracer, rays / 2, nothing, stream(0));
-                    let mut run = Run::new(tracer, light.arrived, light.flux, light.tally, stream(1));
+                    let mut arrived = start(vec![DVec3::ZERO; sides], places);
+                    let light = emit::shoot_all(tracer, rays / 2, &mut arrived, stream(0));
+                    let mut run = Run::new(tracer, arrived, light.flux, light.tally, stream(1));
                     run.shots += light.shots;
                     run
                 }

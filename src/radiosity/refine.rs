@@ -205,10 +205,9 @@ impl<'a> Run<'a> {
 
     /// One batch of shots, with `density` rays for each unit of importance. Returns their importance.
     pub fn step(&mut self, unshot: &Unshot, density: f64) -> f64 {
-        let (mut shots, importance) = self.next_shots(unshot, density);
-        for shot in &mut shots {
+        let (shots, importance) = self.next_shots(unshot, density);
+        for shot in &shots {
             let side = shot.side as usize;
-            shot.from = self.arrived.take_places(shot.side);
             self.all_shot += self.unshot(side);
             self.shot[side] = self.reflectance(side) * self.arrived.flux[side];
         }
@@ -219,7 +218,7 @@ impl<'a> Run<'a> {
     }
 
     /// The sides with the largest unshot flux that hold a share of [`BATCH`] of it, and the importance of what they shoot.
-    fn next_shots(&self, unshot: &Unshot, density: f64) -> (Vec<Shot>, f64) {
+    fn next_shots(&mut self, unshot: &Unshot, density: f64) -> (Vec<Shot>, f64) {
         let least = unshot.least_of_largest(BATCH);
         let (mut shots, mut sum) = (Vec::new(), 0.0);
         for (side, &importance) in (0u32..).zip(&unshot.importance) {
@@ -230,7 +229,8 @@ impl<'a> Run<'a> {
             sum += importance;
             let rays = (importance * density).round().clamp(1.0, u32::MAX.into()) as u32;
             let stream = sampling::hash_all(&[self.stream, side, (self.shots + shots.len() as u64) as u32]);
-            shots.push(Shot { side, rays, flux: self.unshot(side as usize) / f64::from(rays), stream, from: None });
+            let from = self.arrived.take_places(side);
+            shots.push(Shot { side, rays, flux: self.unshot(side as usize) / f64::from(rays), stream, from });
         }
         (shots, sum)
     }

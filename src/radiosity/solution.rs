@@ -63,10 +63,12 @@ impl Solution {
         self.at(triangle, u, v).radiosity[usize::from(!front)]
     }
 
-    /// The part of [`Solution::radiosity`] that came straight from light sources, W/m^2, where the patch's mean says little of a point of it:
-    /// where it lies partly in shadow, or close to a light source. 0 elsewhere, and everywhere with [`DirectLight::Shoot`](super::DirectLight).
-    pub fn uneven(&self, triangle: u32, u: f32, v: f32, front: bool) -> Vec3 {
-        self.at(triangle, u, v).uneven[usize::from(!front)]
+    /// [`Solution::radiosity`], and the part of it that came straight from light sources, where the patch's mean says little of a point of it:
+    /// where it lies partly in shadow, or close to a light source. That is 0 elsewhere, and everywhere with
+    /// [`DirectLight::Shoot`](super::DirectLight) or without [`RadiosityParams::keep_places`](super::RadiosityParams).
+    pub fn look_up(&self, triangle: u32, u: f32, v: f32, front: bool) -> [Vec3; 2] {
+        let (patch, side) = (self.at(triangle, u, v), usize::from(!front));
+        [patch.radiosity[side], patch.uneven[side]]
     }
 
     /// Whether a ray into `direction` meets the front of a triangle of the geometry.

@@ -387,7 +387,7 @@ impl World<'_> {
             Some(caustics) if path.gathers => caustics.unbending(self.scene, point, outgoing),
             _ => None,
         };
-        // Paths from rough reflection have a share in light sources where nothing is interpolated.
+        // Paths from rough reflection have a share in light sources where nothing is interpolated; none start where radiosity is looked up.
         let shares = path.gathers && unbending.is_none() && look_up.is_none();
         if let (Some(light), Some(guided)) = (light, met.lit) {
             let scattered = self.scattered(&bsdf, unbending.as_ref(), shares, light);

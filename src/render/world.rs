@@ -83,15 +83,11 @@ impl FarField<'_> {
         self.solution.radiosity(hit.triangle, hit.u, hit.v, front) * FRAC_1_PI
     }
 
-    /// What is used of that: without direct light where the patch's mean says little of this very point. PMM uses all of it everywhere.
+    /// What is used of that: without direct light where the patch's mean says little of this very point.
     pub fn look_up(&self, hit: &Hit, direction: Vec3) -> LookUp {
-        let all = self.reflected(hit, direction);
-        if self.r_thresh <= 0.0 {
-            return LookUp { radiance: all, unlit: false };
-        }
         let front = self.solution.is_front(hit.triangle, direction);
-        let uneven = self.solution.uneven(hit.triangle, hit.u, hit.v, front);
-        LookUp { radiance: all - uneven * FRAC_1_PI, unlit: uneven != Vec3::ZERO }
+        let [all, uneven] = self.solution.look_up(hit.triangle, hit.u, hit.v, front);
+        LookUp { radiance: all * FRAC_1_PI - uneven * FRAC_1_PI, unlit: uneven != Vec3::ZERO }
     }
 }
 

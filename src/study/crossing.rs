@@ -36,18 +36,17 @@ pub fn crossing_after(
     rendering: impl Fn(&Point) -> f64,
     errors: impl Fn(&Point) -> Option<Errors>,
 ) -> Crossing {
-    let spent = |p: &Point| (preparation(p), rendering(p));
-    let known: Vec<((f64, f64), Errors)> = record.points.iter().filter_map(|p| Some((spent(p), errors(p)?))).collect();
-    let curve: Vec<(f64, Errors)> = known.iter().map(|&((before, after), e)| (before + after, e)).collect();
-    let Some(&((before, after), last)) = known.last() else { return Crossing::Unknown };
+    let spent = |p: &Point| preparation(p) + rendering(p);
+    let curve: Vec<(&Point, Errors)> = record.points.iter().filter_map(|p| Some((p, errors(p)?))).collect();
+    let Some(&(end, last)) = curve.last() else { return Crossing::Unknown };
     // From the end: the last time that the curve passes the level is when it stays below.
     if let Some(k) = curve.iter().rposition(|(_, e)| e.rel_mse >= level) {
-        if let Some(&(t1, e1)) = curve.get(k + 1) {
-            let (t0, e0) = curve[k];
-            return Crossing::At(between(t0, e0.rel_mse, t1, e1.rel_mse, level));
+        if let Some(&(p1, e1)) = curve.get(k + 1) {
+            let (p0, e0) = curve[k];
+            return Crossing::At(between(spent(p0), e0.rel_mse, spent(p1), e1.rel_mse, level));
         }
     } else {
-        return Crossing::At(curve[0].0);
+        return Crossing::At(spent(curve[0].0));
     }
     // Path tracing has no bias; of the others only what is significant counts.
     let floor = match record.role {
@@ -59,7 +58,7 @@ pub fn crossing_after(
     }
     // Beyond the curve, what is noise falls with the number of trials; the bias stays.
     let noise = (last.rel_mse - floor).max(0.0);
-    Crossing::About(before + after * noise / (level - floor))
+    Crossing::About(preparation(end) + rendering(end) * noise / (level - floor))
 }
 
 /// Where a line through two points in logarithmic axes passes a level.

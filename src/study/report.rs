@@ -146,7 +146,7 @@ fn facts(chapter: &Chapter) -> String {
 fn same_time(records: &[Record]) -> f64 {
     let gsii = records.iter().find(|r| r.role == Role::Gsii);
     let point = gsii.and_then(|r| r.points.iter().find(|p| p.trials >= 16.0).or(r.last()));
-    gsii.and(point).map_or(0.0, |p| p.total().cpu)
+    point.map_or(0.0, |p| p.total().cpu)
 }
 
 /// The image that was there at about a time.

@@ -233,10 +233,11 @@ const TWO_PER_CENT: f64 = 4e-4;
 /// neither.
 fn price(chapter: &Chapter<'_>) -> Option<[Crossing; 2]> {
     let run = chapter.run(Role::Gsii)?;
-    let rendering = |share: fn(f64) -> f64| move |p: &Point| share(p.hires_share) * p.rendering.cpu;
     let preparation = |p: &Point| p.preparation.cpu - run.preparation.build.cpu;
-    let direct = crossing_after(run, TWO_PER_CENT, |_| 0.0, rendering(|hires| hires), |p| p.direct);
-    let indirect = crossing_after(run, TWO_PER_CENT, preparation, rendering(|hires| 1.0 - hires), |p| p.indirect);
+    let hires = |p: &Point| p.hires_share * p.rendering.cpu;
+    let lores = |p: &Point| (1.0 - p.hires_share) * p.rendering.cpu;
+    let direct = crossing_after(run, TWO_PER_CENT, |_| 0.0, hires, |p| p.direct);
+    let indirect = crossing_after(run, TWO_PER_CENT, preparation, lores, |p| p.indirect);
     Some([direct, indirect])
 }
 
