@@ -1,17 +1,14 @@
 //! Direct light on patches by sampling the light sources.
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 use rayon::prelude::*;
 
 use super::RadiosityScene;
-use super::arrived::{Place, Places};
+use super::arrived::Places;
 use super::patches::Patches;
-use super::shoot::side_normal;
-use crate::backend::{Coherence, Ray};
-use crate::lighting::shadow::{ShadowBuffers, ShadowRay, light_visibility};
-use crate::lighting::{LightSample, Lit};
+use super::sampled::{Arriving, Draw, Sampled};
+use super::uneven::uneven;
 use crate::sampling;
-use crate::shading::SurfacePoint;
 
 /// Samples a side gets before it is known how much it varies ...
 const PILOT: u32 = 8;
@@ -23,8 +20,8 @@ const PILOT_FAR: u32 = 2;
 const LEAST: [u32; 2] = [4, 1];
 /// Most samples of a side.
 const MOST: u32 = 1 << 14;
-/// Relative standard deviation of single samples, in units of the error that direct light is gathered to, above which the direct light of a
-/// side counts as uneven.
+/// Relative standard deviation over a side, in units of the error that direct light is gathered to, above which its direct light counts as
+/// uneven.
 const UNEVEN: f64 = 20.0;
 /// Relevance below which a side hardly matters.
 const FAR: f64 = 0.05;
@@ -37,8 +34,9 @@ pub(super) struct Direct {
     pub incident: [Vec<DVec3>; 2],
     /// Where that arrived, one entry a side; empty where it was not to be remembered.
     pub places: [Vec<Option<Places>>; 2],
-    /// The mean of `incident` on sides whose samples differ so much that it says little of a point; 0 elsewhere, W.
-    pub uneven: Vec<DVec3>,
+    /// The mean of `incident` on sides where irradiance differs so much that it says little of a point, W. `None` elsewhere, and without
+    /// `places`.
+    pub uneven: Vec<Option<DVec3>>,
     /// Relative error expected of their mean (flux-weighted, as [`Solution::error`](super::Solution::error)).
     pub error: f64,
     /// Shadow rays traced.
@@ -58,7 +56,7 @@ struct Estimate {
 
 impl Estimate {
     /// Whether single samples have a larger relative standard deviation than `limit`.
-    fn is_uneven(&self, limit: f64) -> bool {
+    fn differ(&self, limit: f64) -> bool {
         self.variance > (limit * self.mean.element_sum()).powi(2)
     }
 }
@@ -110,109 +108,58 @@ pub(super) fn gather(input: &RadiosityScene<'_>, patches: &Patches, places: bool
         (incident, found)
     });
     let [(a, at_a), (b, at_b)] = halves;
-    // By the pilot, for the same reason: of sides whose own samples miss a patch of sunlight, all would stay dark.
-    let is_uneven = |side: usize| pilot[side].is_uneven(UNEVEN * target);
-    let mean = |side: usize| if is_uneven(side) { 0.5 * (a[side] + b[side]) } else { DVec3::ZERO };
+    // By samples of their own, for the same reason: of sides whose own samples miss a patch of sunlight, all would stay dark.
+    let limit = UNEVEN * target;
+    let differing: Vec<u32> = (0..).zip(&pilot).filter(|(_, e)| places && e.differ(limit)).map(|(side, _)| side).collect();
+    let (found, rays_for_uneven) = uneven(input, patches, &differing, limit, stream(4));
+    log::debug!("direct light: uneven on {} of {} sides, samples differ on {}", found.len(), sides, differing.len());
+    let mut uneven = vec![None; sides];
+    for side in found.into_iter().map(|side| side as usize) {
+        uneven[side] = Some(0.5 * (a[side] + b[side]));
+    }
     Direct {
-        uneven: (0..sides).map(mean).collect(),
+        uneven,
         incident: [a, b],
         places: [at_a, at_b],
         error: if flux > 0.0 { expected / flux } else { 0.0 },
-        rays,
+        rays: rays + rays_for_uneven,
     }
 }
 
 /// Irradiance of every side from `counts` samples each.
 fn estimate(input: &RadiosityScene<'_>, patches: &Patches, counts: &[u32], places: bool, stream: u32) -> Vec<Estimate> {
-    counts
-        .par_chunks(JOB)
-        .enumerate()
-        .map_init(Buffers::default, |buffers, (job, counts)| {
-            let Buffers { points, lit, samples, owners, rays, values, through, shadow } = buffers;
-            points.clear();
-            lit.clear();
-            owners.clear();
-            for (k, &count) in counts.iter().enumerate() {
-                let side = (job * JOB + k) as u32;
-                if patches.is_inside_of_box(side) {
-                    continue;
-                }
-                let stream = sampling::hash_all(&[stream, side]);
-                for i in 0..count {
-                    let s = sampling::sobol(i, 0, stream);
-                    let choice = sampling::sobol(i, 1, stream)[0];
-                    let point = patches.open_point(input.geometry, side, [s[0], s[1]]);
-                    lit.push(Lit {
-                        position: point.position,
-                        normal: side_normal(&point, side),
-                        u: [choice, s[2], s[3]],
-                    });
-                    points.push(point);
-                    owners.push(k as u32);
-                }
+    let one = |sampled: &mut Sampled, (job, counts): (usize, &[u32])| {
+        let side = |k: u32| (job * JOB) as u32 + k;
+        let draws = (0..).zip(counts).flat_map(|(k, &count)| {
+            let stream = sampling::hash_all(&[stream, side(k)]);
+            (0..count).map(move |i| {
+                let [u, v, light @ ..] = sampling::sobol(i, 0, stream);
+                let [choice, ..] = sampling::sobol(i, 1, stream);
+                Draw { side: side(k), point: [u, v], light: [choice, light[0], light[1]] }
+            })
+        });
+        let mut estimates = vec![Estimate::default(); counts.len()];
+        let mut squares = [0.0; JOB];
+        for &Arriving { side, place, irradiance, .. } in sampled.light(input, patches, draws) {
+            let k = side as usize - job * JOB;
+            let estimate = &mut estimates[k];
+            estimate.mean += irradiance;
+            estimate.rays += 1;
+            if places && irradiance != DVec3::ZERO {
+                let random = sampling::unit(sampling::hash_all(&[stream, side, estimate.rays as u32]));
+                let flux = patches.open_area(side) / f64::from(counts[k]) * irradiance.element_sum();
+                estimate.places.get_or_insert_with(|| Places::new(counts[k] as usize)).offer(place, flux, random);
             }
-            input.lights.sample_all(input.scene, lit, samples);
-            rays.clear();
-            values.clear();
-            for (((point, lit), sample), &owner) in points.iter().zip(lit.iter()).zip(samples.iter()).zip(owners.iter())
-            {
-                let Some(light) = sample else { continue };
-                let cos = light.direction.dot(lit.normal);
-                if cos <= 0.0 || light.weight.max_element() <= 0.0 {
-                    continue;
-                }
-                let ray = Ray {
-                    origin: point.ray_origin(light.direction),
-                    t_near: 0.0,
-                    direction: light.direction,
-                    t_far: light.distance,
-                };
-                rays.push(ShadowRay { ray, light: light.triangle });
-                values.push((owner, Place::of(point), f64::from(cos) * light.weight.as_dvec3()));
+            squares[k] += irradiance.element_sum().powi(2);
+        }
+        for ((estimate, square), &count) in estimates.iter_mut().zip(squares).zip(counts) {
+            let n = f64::from(count.max(1));
+            estimate.mean /= n;
+            if count > 1 {
+                estimate.variance = (square / n - estimate.mean.element_sum().powi(2)).max(0.0) * n / (n - 1.0);
             }
-            through.clear();
-            through.resize(rays.len(), Vec3::ONE);
-            let sources = Some(input.geometry.sources.as_slice());
-            light_visibility(input.rays, input.scene, sources, rays, Coherence::Coherent, shadow, through);
-            let mut estimates = vec![Estimate::default(); counts.len()];
-            let mut squares = [0.0; JOB];
-            for (&(k, place, value), seen) in values.iter().zip(through.iter()) {
-                let value = value * seen.as_dvec3();
-                let estimate = &mut estimates[k as usize];
-                estimate.mean += value;
-                estimate.rays += 1;
-                if places && value != DVec3::ZERO {
-                    let (side, count) = ((job * JOB) as u32 + k, counts[k as usize]);
-                    let random = sampling::unit(sampling::hash_all(&[stream, side, estimate.rays as u32]));
-                    let flux = patches.open_area(side) / f64::from(count) * value.element_sum();
-                    estimate.places.get_or_insert_with(|| Places::new(count as usize)).offer(place, flux, random);
-                }
-                squares[k as usize] += value.element_sum().powi(2);
-            }
-            for ((estimate, square), &count) in estimates.iter_mut().zip(squares).zip(counts) {
-                let n = f64::from(count.max(1));
-                estimate.mean /= n;
-                if count > 1 {
-                    estimate.variance = (square / n - estimate.mean.element_sum().powi(2)).max(0.0) * n / (n - 1.0);
-                }
-            }
-            estimates
-        })
-        .flatten_iter()
-        .collect()
-}
-
-/// Memory that jobs share.
-#[derive(Default)]
-struct Buffers {
-    points: Vec<SurfacePoint>,
-    lit: Vec<Lit>,
-    samples: Vec<Option<LightSample>>,
-    /// Number of the side in its job, for each point.
-    owners: Vec<u32>,
-    rays: Vec<ShadowRay>,
-    /// For each ray the number of its side, where it starts, and the irradiance it brings when nothing is in its way.
-    values: Vec<(u32, Place, DVec3)>,
-    through: Vec<Vec3>,
-    shadow: ShadowBuffers,
+        }
+        estimates
+    };
+    counts.par_chunks(JOB).enumerate().map_init(Sampled::default, one).flatten_iter().collect()
 }

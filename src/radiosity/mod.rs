@@ -11,10 +11,12 @@ mod ledger;
 mod optics;
 mod patches;
 mod refine;
+mod sampled;
 mod shoot;
 mod solution;
 #[cfg(test)]
 mod tests;
+mod uneven;
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -208,8 +210,8 @@ pub fn solve(input: &RadiosityScene<'_>, params: &RadiosityParams, progress: &Pr
 struct Average {
     /// Sum of incident flux of each side, weighted with `weight`.
     sums: [Vec<DVec3>; 2],
-    /// Incident flux of each side straight from light sources, where it is uneven; 0 elsewhere.
-    uneven: Vec<DVec3>,
+    /// Incident flux of each side straight from light sources, where it is uneven.
+    uneven: Vec<Option<DVec3>>,
     weight: f64,
     ledger: Ledger,
     rays: u64,
@@ -221,7 +223,7 @@ impl Average {
     fn new(sides: usize) -> Self {
         Average {
             sums: [vec![DVec3::ZERO; sides], vec![DVec3::ZERO; sides]],
-            uneven: vec![DVec3::ZERO; sides],
+            uneven: vec![None; sides],
             weight: 0.0,
             ledger: Ledger::default(),
             rays: 0,
@@ -242,9 +244,7 @@ impl Average {
         };
         if let Some(direct) = &mut direct {
             self.rays += direct.rays;
-            if params.keep_places {
-                self.uneven = std::mem::take(&mut direct.uneven);
-            }
+            self.uneven = std::mem::take(&mut direct.uneven);
         }
         let relevance = |side: usize| tracer.patches.relevance[side / 2];
         let lit: f64 = match &direct {
@@ -359,8 +359,8 @@ impl Average {
                     let area = patches.open_area((2 * patch + k) as u32);
                     let factor = optics.reflectance[patch].as_dvec3() * (scale / area);
                     solution.radiosity[k] = (factor * (a + b)).as_vec3();
-                    solution.uneven[k] =
-                        (optics.reflectance[patch].as_dvec3() / area * self.uneven[2 * patch + k]).as_vec3();
+                    let reflected = optics.reflectance[patch].as_dvec3() / area;
+                    solution.uneven[k] = self.uneven[2 * patch + k].map(|flux| (reflected * flux).as_vec3());
                     solution.deviation[k] = ((factor * (a - b)).element_sum() / 3.0).abs() as f32;
                 }
                 solution

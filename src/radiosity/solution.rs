@@ -36,8 +36,8 @@ pub struct Solution {
 pub(super) struct PatchSolution {
     /// Radiosity without emission, W/m^2.
     pub radiosity: [Vec3; 2],
-    /// The part of `radiosity` that came straight from light sources, where that varies over the patch; 0 where it hardly does.
-    pub uneven: [Vec3; 2],
+    /// The part of `radiosity` that came straight from light sources, where that varies over the patch.
+    pub uneven: [Option<Vec3>; 2],
     /// Standard error of the mean over bands of `radiosity`.
     pub deviation: [f32; 2],
     /// Diameter.
@@ -64,11 +64,11 @@ impl Solution {
     }
 
     /// [`Solution::radiosity`], and the part of it that came straight from light sources, where the patch's mean says little of a point of it:
-    /// where it lies partly in shadow, or close to a light source. That is 0 elsewhere, and everywhere with
+    /// where it lies partly in shadow, or close to a light source. That is `None` elsewhere, and everywhere with
     /// [`DirectLight::Shoot`](super::DirectLight) or without [`RadiosityParams::keep_places`](super::RadiosityParams).
-    pub fn look_up(&self, triangle: u32, u: f32, v: f32, front: bool) -> [Vec3; 2] {
+    pub fn look_up(&self, triangle: u32, u: f32, v: f32, front: bool) -> (Vec3, Option<Vec3>) {
         let (patch, side) = (self.at(triangle, u, v), usize::from(!front));
-        [patch.radiosity[side], patch.uneven[side]]
+        (patch.radiosity[side], patch.uneven[side])
     }
 
     /// Whether a ray into `direction` meets the front of a triangle of the geometry.

@@ -86,8 +86,8 @@ impl FarField<'_> {
     /// What is used of that: without direct light where the patch's mean says little of this very point.
     pub fn look_up(&self, hit: &Hit, direction: Vec3) -> LookUp {
         let front = self.solution.is_front(hit.triangle, direction);
-        let [all, uneven] = self.solution.look_up(hit.triangle, hit.u, hit.v, front);
-        LookUp { radiance: all * FRAC_1_PI - uneven * FRAC_1_PI, unlit: uneven != Vec3::ZERO }
+        let (all, uneven) = self.solution.look_up(hit.triangle, hit.u, hit.v, front);
+        LookUp { radiance: (all - uneven.unwrap_or(Vec3::ZERO)) * FRAC_1_PI, unlit: uneven.is_some() }
     }
 }
 

@@ -10,7 +10,8 @@ const LEAST_PLACES: usize = 16;
 impl IrradianceCache {
     /// Relative error of a look-up, root of its mean square over the view, as the places of the first pass tell, which lie on a grid of pixels:
     /// what the others say there less what was measured there, without the noise of the latter, which two measurements tell. A little more than
-    /// that of a pixel, as the record that is compared with has no say. `None` where too few places can be asked.
+    /// that of a pixel, as the record that is compared with has no say. At least the standard error of what the places tell: an error below that
+    /// cannot be told from none. `None` where too few places can be asked.
     pub fn error(&self) -> Option<f64> {
         let square = |own: &super::Record| {
             let (noise, told) = (own.noise()?, self.told(own, |other| !other.refuses)?);
@@ -19,9 +20,14 @@ impl IrradianceCache {
             (scale > 0.0).then(|| ((told - measured).powi(2) - noise * measured * measured) / scale)
         };
         let squares: Vec<f64> = self.records.par_iter().filter(|own| !own.refuses).filter_map(square).collect();
+        if squares.len() < LEAST_PLACES {
+            return None;
+        }
         // Without an error, noise makes the mean as often negative as not.
-        let mean = squares.iter().sum::<f64>() / squares.len() as f64;
-        (squares.len() >= LEAST_PLACES).then(|| mean.max(0.0).sqrt())
+        let n = squares.len() as f64;
+        let mean = squares.iter().sum::<f64>() / n;
+        let variance = squares.iter().map(|s| (s - mean).powi(2)).sum::<f64>() / (n - 1.0);
+        Some(mean.max((variance / n).sqrt()).sqrt())
     }
 }
 
@@ -69,6 +75,23 @@ mod tests {
         let variance = squares.iter().map(|s| (s - mean).powi(2)).sum::<f64>() / (n - 1.0);
         // Four standard errors: a false alarm in 6,000. Denominators with noise of 5 % move the mean by less than a per cent.
         assert!((mean - expected).abs() < 4.0 * (variance / n).sqrt() + 0.01 * expected, "{mean} {expected}");
+    }
+
+    /// Where two measurements of each place are so far apart that they leave nothing of what the others say differently, it is their noise that is
+    /// small or large, and no error of zero.
+    #[test]
+    fn no_error_is_smaller_than_it_can_be_told() {
+        let mut cache = wall(0);
+        for record in &mut cache.records {
+            record.variance = record.variance.map(|v| 100.0 * v);
+        }
+        let squares: Vec<f64> = cache.records.iter().filter_map(Record::noise).collect();
+        let n = squares.len() as f64;
+        let mean = squares.iter().sum::<f64>() / n;
+        let of_mean = (squares.iter().map(|s| (s - mean).powi(2)).sum::<f64>() / (n - 1.0) / n).sqrt().sqrt();
+        let found = cache.error().unwrap();
+        // Squares are relative to the mean of two values that are 1 but for 5 % of noise, and differences add 1 % to them.
+        assert!((found / of_mean - 1.0).abs() < 0.1, "{found} {of_mean}");
     }
 
     #[test]
