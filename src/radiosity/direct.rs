@@ -110,7 +110,8 @@ pub(super) fn gather(input: &RadiosityScene<'_>, patches: &Patches, places: bool
     let [(a, at_a), (b, at_b)] = halves;
     // By samples of their own, for the same reason: of sides whose own samples miss a patch of sunlight, all would stay dark.
     let limit = UNEVEN * target;
-    let differing: Vec<u32> = (0..).zip(&pilot).filter(|(_, e)| places && e.differ(limit)).map(|(side, _)| side).collect();
+    let differing: Vec<u32> =
+        (0..).zip(&pilot).filter(|(_, e)| places && e.differ(limit)).map(|(side, _)| side).collect();
     let (found, rays_for_uneven) = uneven(input, patches, &differing, limit, stream(4));
     log::debug!("direct light: uneven on {} of {} sides, samples differ on {}", found.len(), sides, differing.len());
     let mut uneven = vec![None; sides];

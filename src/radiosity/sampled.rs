@@ -71,7 +71,8 @@ impl Sampled {
         input.lights.sample_all(input.scene, lit, samples);
         rays.clear();
         arriving.clear();
-        for (((point, lit), sample), &(draw, side)) in points.iter().zip(lit.iter()).zip(samples.iter()).zip(drawn.iter())
+        for (((point, lit), sample), &(draw, side)) in
+            points.iter().zip(lit.iter()).zip(samples.iter()).zip(drawn.iter())
         {
             let Some(light) = sample else { continue };
             let cos = light.direction.dot(lit.normal);
