@@ -22,7 +22,7 @@ const LEAST: [u32; 2] = [4, 1];
 const MOST: u32 = 1 << 14;
 /// Relative standard deviation over a side, in units of the error that direct light is gathered to, above which its direct light counts as
 /// uneven.
-const UNEVEN: f64 = 20.0;
+const UNEVEN: f64 = 10.0;
 /// Relevance below which a side hardly matters.
 const FAR: f64 = 0.05;
 /// Sides looked at by one job.
