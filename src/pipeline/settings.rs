@@ -130,7 +130,7 @@ impl Settings {
     /// [`Settings::radiosity_error`] for images with a relative error of `error`: each gather averages over dozens of patches. As by default where
     /// no error is asked for (infinity).
     pub fn radiosity_error_for(error: f32) -> f32 {
-        if error.is_finite() { (5.0 * error).clamp(0.1, 0.3) } else { Settings::default().radiosity_error }
+        if error.is_finite() { (5.0 * error).clamp(0.15, 0.3) } else { Settings::default().radiosity_error }
     }
 
     /// `r_thresh`, after automatic choices were filled in.

@@ -20,9 +20,8 @@ const PILOT_FAR: u32 = 2;
 const LEAST: [u32; 2] = [4, 1];
 /// Most samples of a side.
 const MOST: u32 = 1 << 14;
-/// Relative standard deviation over a side, in units of the error that direct light is gathered to, above which its direct light counts as
-/// uneven.
-const UNEVEN: f64 = 10.0;
+/// Relative standard deviation over a side above which its direct light counts as uneven.
+const UNEVEN: f64 = 0.6;
 /// Relevance below which a side hardly matters.
 const FAR: f64 = 0.05;
 /// Sides looked at by one job.
@@ -109,10 +108,9 @@ pub(super) fn gather(input: &RadiosityScene<'_>, patches: &Patches, places: bool
     });
     let [(a, at_a), (b, at_b)] = halves;
     // By samples of their own, for the same reason: of sides whose own samples miss a patch of sunlight, all would stay dark.
-    let limit = UNEVEN * target;
     let differing: Vec<u32> =
-        (0..).zip(&pilot).filter(|(_, e)| places && e.differ(limit)).map(|(side, _)| side).collect();
-    let (found, rays_for_uneven) = uneven(input, patches, &differing, limit, stream(4));
+        (0..).zip(&pilot).filter(|(_, e)| places && e.differ(UNEVEN)).map(|(side, _)| side).collect();
+    let (found, rays_for_uneven) = uneven(input, patches, &differing, UNEVEN, stream(4));
     log::debug!("direct light: uneven on {} of {} sides, samples differ on {}", found.len(), sides, differing.len());
     let mut uneven = vec![None; sides];
     for side in found.into_iter().map(|side| side as usize) {
