@@ -13,6 +13,11 @@ impl IrradianceCache {
     /// that of a pixel, as the record that is compared with has no say. At least the standard error of what the places tell: an error below that
     /// cannot be told from none. `None` where too few places can be asked.
     pub fn error(&self) -> Option<f64> {
+        self.square_error().map(|[mean, of_mean]| mean.max(of_mean).sqrt())
+    }
+
+    /// Mean of its square, without bias, and the standard error of that.
+    fn square_error(&self) -> Option<[f64; 2]> {
         let square = |own: &super::Record| {
             let (noise, told) = (own.noise()?, self.told(own, |other| !other.refuses)?);
             let (told, measured) = (f64::from(told.element_sum()), f64::from(own.radiance.element_sum()));
@@ -27,7 +32,7 @@ impl IrradianceCache {
         let n = squares.len() as f64;
         let mean = squares.iter().sum::<f64>() / n;
         let variance = squares.iter().map(|s| (s - mean).powi(2)).sum::<f64>() / (n - 1.0);
-        Some(mean.max((variance / n).sqrt()).sqrt())
+        Some([mean, (variance / n).sqrt()])
     }
 }
 
@@ -69,7 +74,7 @@ mod tests {
             f64::from(SIGMA).powi(2) * squares / (sum * sum)
         });
         let expected = expected.sum::<f64>() / f64::from(SIDE * SIDE);
-        let squares: Vec<f64> = (0..64).map(|seed| wall(seed).error().unwrap().powi(2)).collect();
+        let squares: Vec<f64> = (0..64).map(|seed| wall(seed).square_error().unwrap()[0]).collect();
         let n = squares.len() as f64;
         let mean = squares.iter().sum::<f64>() / n;
         let variance = squares.iter().map(|s| (s - mean).powi(2)).sum::<f64>() / (n - 1.0);

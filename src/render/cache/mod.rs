@@ -244,13 +244,15 @@ impl IrradianceCache {
         (weights > 0.0).then(|| sum / weights)
     }
 
-    /// Asks the others what each record measured itself. Records that are told something else refuse.
+    /// Asks the others what each record measured itself. Records that are told something else refuse, and those that no other can vouch for
+    /// where as much depends on a single ray.
     fn check(&mut self, tolerance: f32) {
-        let is_off = |own: &Record| {
-            self.told(own, |_| true).is_some_and(|told| {
+        let is_off = |own: &Record| match self.told(own, |_| true) {
+            Some(told) => {
                 let (told, measured) = (told.element_sum(), own.radiance.element_sum());
                 (told - measured).abs() > tolerance * told.max(measured)
-            })
+            }
+            None => own.brightest > tolerance,
         };
         let refuses: Vec<bool> = self.records.par_iter().map(is_off).collect();
         for (record, refuses) in self.records.iter_mut().zip(refuses) {
@@ -344,4 +346,47 @@ fn gather(
         return Some(record);
     }
     once(hash_all(&[stream, TWICE])).map(|again| record.averaged(&again, strata.len()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A cache of records at `positions`, each with one ray in 48 that is so many times as bright as the others.
+    fn cache(positions: &[(Vec3, f32)]) -> IrradianceCache {
+        let strata = Strata::of(48.0);
+        let record = |&(position, times): &(Vec3, f32)| {
+            let radiance: Vec<Vec3> =
+                (0..strata.len()).map(|k| Vec3::splat(if k == 7 { times } else { 1.0 })).collect();
+            Record::new(position, Vec3::Z, 1.0, strata, &radiance, &vec![10.0; strata.len()]).unwrap()
+        };
+        let records: Vec<Record> = positions.iter().map(record).collect();
+        IrradianceCache { index: Index::new(&records), records, ..IrradianceCache::default() }
+    }
+
+    fn refuses(mut cache: IrradianceCache, tolerance: f32) -> Vec<bool> {
+        cache.check(tolerance);
+        cache.records.iter().map(|record| record.refuses).collect()
+    }
+
+    /// A ray that is 11 times as bright brings 11/58 of the light.
+    #[test]
+    fn a_record_alone_must_not_depend_on_one_ray() {
+        assert_eq!(refuses(cache(&[(Vec3::ZERO, 1.0)]), 0.12), [false]);
+        assert_eq!(refuses(cache(&[(Vec3::ZERO, 11.0)]), 0.12), [true]);
+        assert_eq!(refuses(cache(&[(Vec3::ZERO, 11.0)]), 0.2), [false]);
+        let far = 5.0 * Vec3::X;
+        assert_eq!(refuses(cache(&[(Vec3::ZERO, 11.0), (far, 1.0)]), 0.12), [true, false]);
+    }
+
+    /// Where two reach each other, what they say decides: 58/48 differs from 1 by 17 % of the larger.
+    #[test]
+    fn records_that_contradict_each_other_refuse() {
+        let near = 0.1 * Vec3::X;
+        assert_eq!(refuses(cache(&[(Vec3::ZERO, 11.0), (near, 11.0)]), 0.12), [false, false]);
+        let mut odd = cache(&[(Vec3::ZERO, 11.0), (near, 1.0)]);
+        odd.records.iter_mut().for_each(|record| record.by_translation = [Vec3::ZERO; 3]);
+        assert_eq!(refuses(odd.clone(), 0.12), [true, true]);
+        assert_eq!(refuses(odd, 0.2), [false, false]);
+    }
 }

@@ -196,6 +196,7 @@ mod tests {
             least_reach: 0.1,
             refuses: random([seed, 2, 1]) < 0.2,
             radiance: vector(seed, 3).abs(),
+            brightest: 1.0,
             rays: 1,
             variance: None,
             by_rotation: [4, 5, 6].map(|what| vector(seed, what)),
