@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use super::LightSample;
 use crate::backend::{Coherence, Hit, PartKind, Ray, RayScene, Visible};
 use crate::scene::Scene;
 use crate::shading::{Bsdf, Lobes, SurfacePoint};
@@ -20,7 +21,7 @@ const COPLANAR: f32 = 0.999;
 pub struct ShadowRay {
     /// The ray, unit direction, with [`Ray::t_far`] at the light.
     pub ray: Ray,
-    /// The emitting triangle of the scene ([`LightSample::triangle`](super::LightSample::triangle)), or [`Hit::NONE`].
+    /// The emitting triangle of the scene ([`LightSample::triangle`]), or [`Hit::NONE`].
     pub light: u32,
 }
 
@@ -82,6 +83,12 @@ pub struct ShadowBuffers {
 }
 
 impl ShadowRay {
+    /// From a point to what was sampled for it.
+    pub fn towards(light: &LightSample, point: &SurfacePoint) -> ShadowRay {
+        let ray = Ray::new(point.ray_origin(light.direction), light.direction);
+        ShadowRay { ray: Ray { t_far: light.distance, ..ray }, light: light.triangle }
+    }
+
     /// The ray up to where rounding begins to matter for a hit on the light itself.
     fn before_light(&self) -> Ray {
         match self.light {

@@ -6,7 +6,7 @@ use super::RadiosityScene;
 use super::arrived::Place;
 use super::patches::Patches;
 use super::shoot::side_normal;
-use crate::backend::{Coherence, Ray};
+use crate::backend::Coherence;
 use crate::lighting::shadow::{ShadowBuffers, ShadowRay, light_visibility};
 use crate::lighting::{LightSample, Lit};
 use crate::shading::SurfacePoint;
@@ -79,13 +79,7 @@ impl Sampled {
             if cos <= 0.0 || light.weight.max_element() <= 0.0 {
                 continue;
             }
-            let ray = Ray {
-                origin: point.ray_origin(light.direction),
-                t_near: 0.0,
-                direction: light.direction,
-                t_far: light.distance,
-            };
-            rays.push(ShadowRay { ray, light: light.triangle });
+            rays.push(ShadowRay::towards(light, point));
             let irradiance = f64::from(cos) * light.weight.as_dvec3();
             arriving.push(Arriving { draw, side, place: Place::of(point), irradiance });
         }

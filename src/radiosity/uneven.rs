@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::RadiosityScene;
 use super::patches::Patches;
-use super::sampled::{Draw, Sampled};
+use super::sampled::{Arriving, Draw, Sampled};
 use crate::sampling;
 
 /// Points that are looked at on a side.
@@ -51,16 +51,16 @@ pub(super) fn uneven(
             })
         });
         let mut pairs = vec![Pairs::default(); sides.len()];
-        let mut last = (u32::MAX, 0.0);
         let arriving = sampled.light(input, patches, draws);
-        for one in arriving {
-            let (pair, light) = (one.draw / 2, one.irradiance.element_sum());
-            let of_side = &mut pairs[(pair / POINTS) as usize];
-            of_side.sums[(one.draw % 2) as usize] += light;
-            if last.0 == pair {
-                of_side.products += last.1 * light;
+        let light = |one: &Arriving| one.irradiance.element_sum();
+        for of_point in arriving.chunk_by(|a, b| a.draw / 2 == b.draw / 2) {
+            let of_side = &mut pairs[(of_point[0].draw / (2 * POINTS)) as usize];
+            for one in of_point {
+                of_side.sums[(one.draw % 2) as usize] += light(one);
             }
-            last = (pair, light);
+            if let [first, second] = of_point {
+                of_side.products += light(first) * light(second);
+            }
         }
         let found = sides.iter().zip(&pairs).filter(|(_, pairs)| pairs.differ(limit)).map(|(&side, _)| side);
         (found.collect::<Vec<u32>>(), arriving.len() as u64)

@@ -541,8 +541,7 @@ fn shine(ws: &mut Workspace, path: &Path, point: &SurfacePoint, scattered: Vec3,
     if radiance == Vec3::ZERO {
         return;
     }
-    let ray = Ray { t_far: light.distance, ..Ray::new(point.ray_origin(light.direction), light.direction) };
-    ws.shadow_rays.push(ShadowRay { ray, light: light.triangle });
+    ws.shadow_rays.push(ShadowRay::towards(light, point));
     ws.shadows.push(Shadow { radiance, trial: path.trial, gathers: path.gathers, guided });
 }
 

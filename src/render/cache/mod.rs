@@ -247,12 +247,12 @@ impl IrradianceCache {
     /// Asks the others what each record measured itself. Records that are told something else refuse, and those that no other can vouch for
     /// where as much depends on a single ray.
     fn check(&mut self, tolerance: f32) {
-        let is_off = |own: &Record| match self.told(own, |_| true) {
-            Some(told) => {
-                let (told, measured) = (told.element_sum(), own.radiance.element_sum());
-                (told - measured).abs() > tolerance * told.max(measured)
+        let is_off = |own: &Record| {
+            let measured = own.radiance.element_sum();
+            match self.told(own, |_| true).map(Vec3::element_sum) {
+                Some(told) => (told - measured).abs() > tolerance * told.max(measured),
+                None => own.brightest > tolerance * measured,
             }
-            None => own.brightest > tolerance,
         };
         let refuses: Vec<bool> = self.records.par_iter().map(is_off).collect();
         for (record, refuses) in self.records.iter_mut().zip(refuses) {

@@ -76,7 +76,7 @@ pub(super) struct Record {
     pub refuses: bool,
     /// Irradiance over pi: the radiance that a white diffuse surface reflects, W/(sr m^2).
     pub radiance: Vec3,
-    /// Share of its light that its brightest ray brought, bands together.
+    /// The part of `radiance` that the brightest ray brought, bands together.
     pub brightest: f32,
     /// Rays that it is the mean of.
     pub rays: u32,
@@ -158,7 +158,7 @@ impl Record {
             least_reach,
             refuses: false,
             radiance: mean,
-            brightest: share_of_brightest(radiance),
+            brightest: radiance.iter().map(|r| r.element_sum()).fold(0.0, f32::max) / rays as f32,
             rays: rays as u32,
             variance: None,
             by_rotation,
@@ -172,13 +172,11 @@ impl Record {
         let halves = |a: [Vec3; 3], b: [Vec3; 3]| [0, 1, 2].map(|i| half(a[i], b[i]));
         let (sum, difference) =
             ((self.radiance + other.radiance).element_sum(), (self.radiance - other.radiance).element_sum());
-        let of_ray = |record: &Record| record.brightest * record.radiance.element_sum();
-        let brightest = of_ray(self).max(of_ray(other));
         Record {
             // Harmonic, as of all rays together.
             distance: 2.0 / (1.0 / self.distance + 1.0 / other.distance),
             radiance: half(self.radiance, other.radiance),
-            brightest: if sum > 0.0 { brightest / sum } else { 0.0 },
+            brightest: 0.5 * self.brightest.max(other.brightest),
             // Of the mean of two it is (difference / sum)^2.
             rays: self.rays + other.rays,
             variance: (sum > 0.0).then(|| (difference / sum).powi(2) * 2.0 * rays as f32),
@@ -230,11 +228,6 @@ impl Record {
         let limit = MOST_CHANGE * self.radiance;
         self.radiance + change.clamp(-limit, limit)
     }
-}
-
-fn share_of_brightest(radiance: &[Vec3]) -> f32 {
-    let (sum, most) = radiance.iter().map(|r| r.element_sum()).fold((0.0, 0.0_f32), |(s, m), r| (s + r, m.max(r)));
-    if sum > 0.0 { most / sum } else { 0.0 }
 }
 
 #[cfg(test)]
@@ -291,7 +284,8 @@ mod tests {
             let both = a.averaged(&b, 768);
             assert!((both.radiance - 0.5 * (a.radiance + b.radiance)).length() < 1e-6);
             // Every other ray of 1536 brings three halves of the mean.
-            assert!((both.brightest * 1536.0 / 1.5 - 1.0).abs() < 0.1, "{}", both.brightest);
+            let share = both.brightest / both.radiance.element_sum();
+            assert!((share * 1536.0 / 1.5 - 1.0).abs() < 0.1, "{share}");
             both.variance.unwrap()
         };
         let variance = (0..count).map(of_pair).sum::<f32>() / count as f32;
