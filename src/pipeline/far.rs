@@ -68,18 +68,19 @@ impl Far {
         let solution = kept.solve(&input, complete, &settings.radiosity_params(), progress)?;
         stats.record_time(start, |s| &mut s.radiosity);
         stats.record_solution(&solution);
-        let plain = geometry.sources.iter().map(|source| is_plain(scene, source)).collect();
+        let plain = geometry.sources.iter().map(|source| is_plain(scene, source, complete)).collect();
         Ok(Far { simplified: (!complete).then_some(simplified), geometry, rays, solution, plain, nearness })
     }
 }
 
-/// Whether all that leaves a triangle of the far field's geometry is in the radiosity solution.
-fn is_plain(scene: &Scene, source: &TriangleSource) -> bool {
+/// Whether all that leaves a triangle of the far field's geometry is taken from the radiosity solution: for PMM with rough reflection as if it
+/// were diffuse.
+fn is_plain(scene: &Scene, source: &TriangleSource, complete: bool) -> bool {
     match *source {
         TriangleSource::BoxFace { .. } => true,
         TriangleSource::Scene { triangle } => {
             let material = scene.material(triangle);
-            !material.is_emitter() && !material.may_be_sharp()
+            !material.is_emitter() && if complete { !material.may_be_sharp() } else { material.is_lambertian() }
         }
     }
 }

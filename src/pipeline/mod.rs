@@ -129,6 +129,7 @@ impl Prepared {
                 threshold: self.settings.glossy_threshold,
                 // Path tracing is the reference: nothing is blurred there.
                 least_roughness: if self.far.is_some() { self.settings.filter_glossy } else { 0.0 },
+                mirrors: false,
             },
             cache: self.flight.as_ref(),
             caustics: self.caustics.as_ref(),

@@ -1,8 +1,9 @@
 //! Light that has arrived at the sides of patches, and where on them.
 
-use glam::DVec3;
+use glam::{DVec3, Vec2};
 
 use super::patches::inset;
+use super::slope::Moments;
 use crate::backend::Hit;
 use crate::sampling;
 use crate::shading::SurfacePoint;
@@ -29,6 +30,19 @@ impl Place {
     pub fn met(hit: &Hit) -> Place {
         Place { triangle: hit.triangle, uv: [inset(hit.u), inset(hit.v)] }
     }
+}
+
+/// Light that arrived somewhere.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Landing {
+    /// The side.
+    pub side: u32,
+    /// W.
+    pub flux: DVec3,
+    /// Where.
+    pub place: Place,
+    /// The same in the coordinates of the grid's cell, 0..=1.
+    pub local: Vec2,
 }
 
 /// Points of one side where light arrived, each kept as likely as its share in the light.
@@ -68,12 +82,30 @@ impl Places {
     }
 }
 
+/// Where light arrived, one entry a side; empty where it is not to be remembered.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Whereabouts {
+    /// As places to shoot from.
+    pub places: Vec<Option<Places>>,
+    /// As moments over the side.
+    pub moments: Vec<Moments>,
+}
+
+impl Whereabouts {
+    /// Of no light yet, on so many sides.
+    pub fn nowhere(sides: usize) -> Self {
+        Whereabouts { places: vec![None; sides], moments: vec![Moments::default(); sides] }
+    }
+}
+
 /// Light that has arrived at all sides.
 #[derive(Clone, Debug)]
 pub(super) struct Arrived {
     /// Flux, W.
     pub flux: Vec<DVec3>,
-    /// Where it arrived since the side last shot; empty where that is not remembered.
+    /// Where it arrived; empty where that is not remembered.
+    pub moments: Vec<Moments>,
+    /// The same since the side last shot, as places to shoot from; empty with `moments`.
     places: Vec<Option<Places>>,
     /// Points wanted of a side.
     wanted: usize,
@@ -83,15 +115,16 @@ pub(super) struct Arrived {
 }
 
 impl Arrived {
-    /// `flux` on each side, at `places`, where those are remembered: about `wanted` for each side, from now on.
-    pub fn new(flux: Vec<DVec3>, places: Vec<Option<Places>>, wanted: usize, stream: u32) -> Self {
-        Arrived { flux, places, wanted, stream, count: 0 }
+    /// `flux` on each side, and where that arrived, `at`, if it is to be remembered: about `wanted` places for each side, from now on.
+    pub fn new(flux: Vec<DVec3>, at: Whereabouts, wanted: usize, stream: u32) -> Self {
+        Arrived { flux, moments: at.moments, places: at.places, wanted, stream, count: 0 }
     }
 
     /// Adds light.
-    pub fn add(&mut self, side: u32, flux: DVec3, place: Place) {
+    pub fn add(&mut self, Landing { side, flux, place, local }: Landing) {
         self.flux[side as usize] += flux;
         if let Some(places) = self.places.get_mut(side as usize) {
+            self.moments[side as usize].add(flux.element_sum(), local);
             self.count = self.count.wrapping_add(1);
             let random = sampling::unit(sampling::hash(self.stream ^ self.count));
             places.get_or_insert_with(|| Places::new(self.wanted)).offer(place, flux.element_sum(), random);

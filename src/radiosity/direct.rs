@@ -4,9 +4,10 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::RadiosityScene;
-use super::arrived::Places;
+use super::arrived::{Places, Whereabouts};
 use super::patches::Patches;
 use super::sampled::{Arriving, Draw, Sampled};
+use super::slope::Moments;
 use super::uneven::uneven;
 use crate::sampling;
 
@@ -31,10 +32,10 @@ const JOB: usize = 64;
 pub(super) struct Direct {
     /// Incident flux of each side, two independent estimates, W.
     pub incident: [Vec<DVec3>; 2],
-    /// Where that arrived, one entry a side; empty where it was not to be remembered.
-    pub places: [Vec<Option<Places>>; 2],
+    /// Where that arrived.
+    pub at: [Whereabouts; 2],
     /// The mean of `incident` on sides where irradiance differs so much that it says little of a point, W. `None` elsewhere, and without
-    /// `places`.
+    /// places.
     pub uneven: Vec<Option<DVec3>>,
     /// Relative error expected of their mean (flux-weighted, as [`Solution::error`](super::Solution::error)).
     pub error: f64,
@@ -51,6 +52,7 @@ struct Estimate {
     rays: u64,
     /// Where the light was found, if that is asked for.
     places: Option<Places>,
+    moments: Moments,
 }
 
 impl Estimate {
@@ -102,9 +104,13 @@ pub(super) fn gather(input: &RadiosityScene<'_>, patches: &Patches, places: bool
     let halves = [0, 1].map(|half| {
         let mut estimates = estimate(input, patches, &counts, places, stream(half));
         rays += estimates.iter().map(|e| e.rays).sum::<u64>();
-        let found = if places { estimates.iter_mut().map(|e| e.places.take()).collect() } else { Vec::new() };
+        let mut at = Whereabouts::default();
+        if places {
+            at.places = estimates.iter_mut().map(|e| e.places.take()).collect();
+            at.moments = estimates.iter().map(|e| e.moments).collect();
+        }
         let incident: Vec<DVec3> = estimates.iter().enumerate().map(|(s, e)| area(s) * e.mean).collect();
-        (incident, found)
+        (incident, at)
     });
     let [(a, at_a), (b, at_b)] = halves;
     // By samples of their own, for the same reason: of sides whose own samples miss a patch of sunlight, all would stay dark.
@@ -119,7 +125,7 @@ pub(super) fn gather(input: &RadiosityScene<'_>, patches: &Patches, places: bool
     Direct {
         uneven,
         incident: [a, b],
-        places: [at_a, at_b],
+        at: [at_a, at_b],
         error: if flux > 0.0 { expected / flux } else { 0.0 },
         rays: rays + rays_for_uneven,
     }
@@ -148,6 +154,7 @@ fn estimate(input: &RadiosityScene<'_>, patches: &Patches, counts: &[u32], place
                 let random = sampling::unit(sampling::hash_all(&[stream, side, estimate.rays as u32]));
                 let flux = patches.open_area(side) / f64::from(counts[k]) * irradiance.element_sum();
                 estimate.places.get_or_insert_with(|| Places::new(counts[k] as usize)).offer(place, flux, random);
+                estimate.moments.add(flux, patches.map.locate(place.triangle, place.uv[0], place.uv[1]).1);
             }
             squares[k] += irradiance.element_sum().powi(2);
         }

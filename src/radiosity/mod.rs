@@ -13,6 +13,7 @@ mod patches;
 mod refine;
 mod sampled;
 mod shoot;
+mod slope;
 mod solution;
 #[cfg(test)]
 mod tests;
@@ -29,7 +30,7 @@ use crate::progress::Progress;
 use crate::sampling;
 use crate::scene::Scene;
 use crate::simplify::{Cluster, SimplifiedGeometry};
-use arrived::Arrived;
+use arrived::{Arrived, Whereabouts};
 use direct::Direct;
 pub use ledger::Ledger;
 use ledger::Tally;
@@ -37,6 +38,7 @@ use optics::Optics;
 use patches::Patches;
 use refine::Run;
 use shoot::Tracer;
+use slope::Moments;
 use solution::PatchSolution;
 pub use solution::Solution;
 
@@ -203,7 +205,7 @@ pub fn solve(input: &RadiosityScene<'_>, params: &RadiosityParams, progress: &Pr
         let tracer = Tracer { input, patches: &patches, optics: &optics };
         average.solve(&tracer, params, progress)?;
     }
-    Ok(average.into_solution(patches, &optics))
+    Ok(average.into_solution(input.geometry, patches, &optics))
 }
 
 /// Mean of independent solutions, in two halves.
@@ -212,6 +214,8 @@ struct Average {
     sums: [Vec<DVec3>; 2],
     /// Incident flux of each side straight from light sources, where it is uneven.
     uneven: Vec<Option<DVec3>>,
+    /// Where the light arrived that is looked up, as `sums`; without light where it is not known.
+    moments: [Vec<Moments>; 2],
     weight: f64,
     ledger: Ledger,
     rays: u64,
@@ -224,6 +228,7 @@ impl Average {
         Average {
             sums: [vec![DVec3::ZERO; sides], vec![DVec3::ZERO; sides]],
             uneven: vec![None; sides],
+            moments: [vec![Moments::default(); sides], vec![Moments::default(); sides]],
             weight: 0.0,
             ledger: Ledger::default(),
             rays: 0,
@@ -298,10 +303,10 @@ impl Average {
         let sides = 2 * tracer.patches.len();
         let solution = |half: usize, progress: &Progress| {
             let stream = |what: u32| sampling::hash_all(&[params.seed, round, half as u32, what]);
-            let start = |flux, places| Arrived::new(flux, places, rays as usize / sides, stream(2));
+            let start = |flux, at| Arrived::new(flux, at, rays as usize / sides, stream(2));
             let mut run = match gathered {
                 Some(gathered) => {
-                    let mut arrived = start(gathered.incident[half].clone(), gathered.places[half].clone());
+                    let mut arrived = start(gathered.incident[half].clone(), gathered.at[half].clone());
                     let emitted = arrived.flux.iter().sum();
                     let mut tally = Tally::default();
                     if tracer.optics.any_specular {
@@ -310,8 +315,8 @@ impl Average {
                     Run::new(tracer, arrived, emitted, tally, stream(1))
                 }
                 None => {
-                    let places = if params.keep_places { vec![None; sides] } else { Vec::new() };
-                    let mut arrived = start(vec![DVec3::ZERO; sides], places);
+                    let at = if params.keep_places { Whereabouts::nowhere(sides) } else { Whereabouts::default() };
+                    let mut arrived = start(vec![DVec3::ZERO; sides], at);
                     let light = emit::shoot_all(tracer, rays / 2, &mut arrived, stream(0));
                     let mut run = Run::new(tracer, arrived, light.flux, light.tally, stream(1));
                     run.shots += light.shots;
@@ -325,6 +330,11 @@ impl Average {
         for (half, run) in [first?, second?].into_iter().enumerate() {
             for (sum, flux) in self.sums[half].iter_mut().zip(run.incident(params.ambient)) {
                 *sum += weight * flux;
+            }
+            // What is looked up of an uneven side is reflected light alone.
+            for (side, moments) in run.moments().iter().enumerate() {
+                let direct = gathered.filter(|_| self.uneven[side].is_some()).map(|g| g.at[half].moments[side]);
+                self.moments[half][side].add_rest(weight, *moments, direct.unwrap_or_default());
             }
             self.ledger.add(&run.ledger(), 0.5 * weight);
             self.rays += run.rays();
@@ -346,12 +356,12 @@ impl Average {
         if sum > 0.0 { FRAC_PI_2.sqrt() * difference / sum } else { 0.0 }
     }
 
-    fn into_solution(self, patches: Patches, optics: &Optics) -> Solution {
+    fn into_solution(self, geometry: &SimplifiedGeometry, patches: Patches, optics: &Optics) -> Solution {
         let error = self.error(&patches, optics) as f32;
         let scale = if self.weight > 0.0 { 0.5 / self.weight } else { 0.0 };
         let mut ledger = Ledger::default();
         ledger.add(&self.ledger, 2.0 * scale);
-        let of_patch = (0..patches.len())
+        let mut of_patch: Vec<PatchSolution> = (0..patches.len())
             .map(|patch| {
                 let mut solution = PatchSolution { diameter: patches.diameter[patch], ..PatchSolution::default() };
                 for k in 0..2 {
@@ -366,8 +376,16 @@ impl Average {
                 solution
             })
             .collect();
+        let found = slope::find(geometry, &patches, &self.moments);
+        log::debug!("light slopes on {} of {} sides", found.len(), 2 * patches.len());
+        let mut slopes = Vec::with_capacity(found.len());
+        for (number, (side, slope)) in (0..).zip(found) {
+            of_patch[side as usize / 2].slope[side as usize % 2] = Some(number);
+            slopes.push(slope);
+        }
         Solution {
             of_patch,
+            slopes,
             largest_diameter: patches.diameter.iter().copied().fold(0.0, f32::max),
             ledger,
             patches: patches.len(),

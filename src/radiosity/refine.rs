@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use super::arrived::Arrived;
 use super::ledger::{Ledger, Tally};
 use super::shoot::{Shot, Tracer};
+use super::slope::Moments;
 use crate::error::{Error, Result};
 use crate::progress::Progress;
 use crate::sampling;
@@ -104,6 +105,11 @@ impl<'a> Run<'a> {
             shots: 0,
             stream,
         }
+    }
+
+    /// Where light arrived, one entry a side; none where that is not known.
+    pub fn moments(&self) -> &[Moments] {
+        &self.arrived.moments
     }
 
     /// Rays traced so far.

@@ -7,7 +7,7 @@ use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::RadiosityScene;
-use super::arrived::{Arrived, Place, Places};
+use super::arrived::{Arrived, Landing, Place, Places};
 use super::ledger::Tally;
 use super::optics::Optics;
 use super::patches::Patches;
@@ -130,8 +130,7 @@ struct Scratch {
 
 #[derive(Default)]
 struct Output {
-    /// Sides, light, and where it arrived.
-    deposits: Vec<(u32, DVec3, Place)>,
+    landings: Vec<Landing>,
     tally: Tally,
 }
 
@@ -193,8 +192,8 @@ impl Tracer<'_> {
                 })
                 .collect();
             for output in outputs {
-                for (side, flux, place) in output.deposits {
-                    arrived.add(side, flux, place);
+                for landing in output.landings {
+                    arrived.add(landing);
                 }
                 tally.add(&output.tally);
             }
@@ -204,7 +203,7 @@ impl Tracer<'_> {
 
     fn follow(&self, scratch: &mut Scratch, deposit: Deposit) -> Output {
         let Scratch { photons, next, hits } = scratch;
-        let mut output = Output { deposits: Vec::with_capacity(photons.rays.len()), tally: Tally::default() };
+        let mut output = Output { landings: Vec::with_capacity(photons.rays.len()), tally: Tally::default() };
         for depth in 0..MAX_CHAIN {
             if photons.rays.is_empty() {
                 return output;
@@ -226,10 +225,11 @@ impl Tracer<'_> {
                     }
                     continue;
                 }
-                let patch = self.patches.map.at(hit.triangle, hit.u, hit.v);
+                let (patch, local) = self.patches.map.locate(hit.triangle, hit.u, hit.v);
                 if counts {
                     let front = ray.direction.dot(self.patches.planes[hit.triangle as usize].normal) < 0.0;
-                    output.deposits.push((2 * patch + u32::from(!front), load.flux, Place::met(hit)));
+                    let side = 2 * patch + u32::from(!front);
+                    output.landings.push(Landing { side, flux: load.flux, place: Place::met(hit), local });
                 }
                 if self.optics.specular[patch as usize]
                     && let Some((ray, load)) = self.pass_on(patch, hit, ray.direction, load, depth as u32)

@@ -5,12 +5,14 @@ use serde::{Deserialize, Serialize};
 
 use super::ledger::Ledger;
 use super::patches::PatchMap;
+use super::slope::Slope;
 
 /// Radiosities of both sides of every patch, and the way from a hit to its patch.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Solution {
     pub(super) map: PatchMap,
     pub(super) of_patch: Vec<PatchSolution>,
+    pub(super) slopes: Vec<Slope>,
     /// Of all patches.
     pub(super) largest_diameter: f32,
     /// Unit normal of each triangle.
@@ -40,6 +42,8 @@ pub(super) struct PatchSolution {
     pub uneven: [Option<Vec3>; 2],
     /// Standard error of the mean over bands of `radiosity`.
     pub deviation: [f32; 2],
+    /// Number of the slope of what is looked up, where there is one.
+    pub slope: [Option<u32>; 2],
     /// Diameter.
     pub diameter: f32,
 }
@@ -49,6 +53,7 @@ impl Solution {
     pub(crate) fn restored(self, triangles: usize) -> Option<Solution> {
         let whole = self.patches == self.of_patch.len()
             && self.normals.len() == triangles
+            && self.of_patch.iter().flat_map(|p| p.slope).flatten().all(|slope| (slope as usize) < self.slopes.len())
             && self.map.is_whole(triangles, self.patches);
         whole.then_some(Solution { rays: 0, ..self })
     }
@@ -63,17 +68,25 @@ impl Solution {
         self.at(triangle, u, v).radiosity[usize::from(!front)]
     }
 
-    /// [`Solution::radiosity`], and the part of it that came straight from light sources, where the patch's mean says little of a point of it:
-    /// where it lies partly in shadow, or close to a light source. That is `None` elsewhere, and everywhere with
-    /// [`DirectLight::Shoot`](super::DirectLight) or without [`RadiosityParams::keep_places`](super::RadiosityParams).
-    pub fn look_up(&self, triangle: u32, u: f32, v: f32, front: bool) -> (Vec3, Option<Vec3>) {
-        let (patch, side) = (self.at(triangle, u, v), usize::from(!front));
-        (patch.radiosity[side], patch.uneven[side])
+    /// Radiosity minus emission at that point, W/m^2, as far as it is known to first order how it changes over the patch; and whether direct
+    /// light is left out of it, because the patch's mean says little of a point: where it lies partly in shadow, or close to a light
+    /// source. Without [`RadiosityParams::keep_places`](super::RadiosityParams) it is [`Solution::radiosity`], and with
+    /// [`DirectLight::Shoot`](super::DirectLight) nothing is left out.
+    pub fn look_up(&self, triangle: u32, u: f32, v: f32, front: bool) -> (Vec3, bool) {
+        let (number, local) = self.map.locate(triangle, u, v);
+        let (patch, side) = (&self.of_patch[number as usize], usize::from(!front));
+        let slope = patch.slope[side].map_or(1.0, |slope| self.slopes[slope as usize].at(local));
+        (slope * (patch.radiosity[side] - patch.uneven[side].unwrap_or_default()), patch.uneven[side].is_some())
     }
 
     /// Whether a ray into `direction` meets the front of a triangle of the geometry.
     pub fn is_front(&self, triangle: u32, direction: Vec3) -> bool {
         self.normals[triangle as usize].dot(direction) < 0.0
+    }
+
+    /// Cosine between `direction` and the normal of a triangle of the geometry, 0..=1.
+    pub fn cosine(&self, triangle: u32, direction: Vec3) -> f32 {
+        self.normals[triangle as usize].dot(direction).abs()
     }
 
     /// Standard error of the mean over bands of [`Solution::radiosity`], W/m^2: half the difference of two independent halves,

@@ -30,8 +30,8 @@ use crate::backend::{Coherence, Hit, Ray, Visible};
 use crate::lighting::guide::Guided;
 use crate::lighting::shadow::{ShadowRay, light_visibility};
 use crate::lighting::{LightSample, Lit};
-use crate::scene::Camera;
-use crate::shading::{Bsdf, Lobes, SurfacePoint};
+use crate::scene::{Camera, Material};
+use crate::shading::{Bsdf, Lobes, SurfacePoint, fresnel};
 use crate::simplify::TriangleSource;
 
 /// A far ray starts this much (relative) before the near one ended, so that nothing falls between the two.
@@ -59,6 +59,9 @@ const MET_AT_ONCE: usize = 128;
 
 /// Share of paths that gather rough reflection apart from diffuse, per unit of its albedo.
 const PATHS_PER_ALBEDO: f32 = 4.0;
+
+/// Share of looked-up radiance above which what a light source adds by rough reflection is always brought.
+const LITTLE: f32 = 0.5;
 
 /// From this trial on a tile remembers where it finds light: images of fewer trials have no use for that.
 pub(super) const LEARN_FROM: u32 = 16;
@@ -279,12 +282,20 @@ impl World<'_> {
             ws.lores[path.trial as usize] += path.throughput * far.reflected(hit, path.ray.direction);
             return;
         };
-        let look_up = (!near).then(|| far.look_up(hit, path.ray.direction));
-        if let Some(LookUp { radiance, unlit: false }) = look_up
-            && far.plain[hit.triangle as usize]
+        let material = self.scene.material(triangle);
+        let mut look_up = (!near).then(|| far.look_up(hit, path.ray.direction, !material.is_lambertian()));
+        if let Some(look_up) = &mut look_up
+            && !look_up.unlit
         {
-            ws.lores[path.trial as usize] += path.throughput * radiance;
-            return;
+            let plain = far.plain[hit.triangle as usize];
+            if !plain {
+                let cosine = far.solution.cosine(hit.triangle, path.ray.direction);
+                look_up.probability = rough_probability(Vec3::splat(most_specular(material, cosine)));
+            }
+            if plain || (look_up.probability < 1.0 && path.random(0)[3] >= look_up.probability) {
+                ws.lores[path.trial as usize] += path.throughput * look_up.radiance;
+                return;
+            }
         }
         // The triangle is the same one in the detailed scene.
         self.meet(ws, index, &Hit { triangle, ..*hit }, look_up, passes, capture);
@@ -308,7 +319,11 @@ impl World<'_> {
             (true, None) => 0.0,
         };
         let wanted = if path.gathers { passes.lores } else { passes.hires };
-        let lit = look_up.is_none_or(|l| l.unlit) && wanted && path.depth < self.max_depth && !self.lights.is_empty();
+        let glossy = || !self.scene.material(point.triangle).is_lambertian();
+        let lit = look_up.is_none_or(|l| l.unlit || glossy())
+            && wanted
+            && path.depth < self.max_depth
+            && !self.lights.is_empty();
         let lit = lit.then(|| {
             let [choice, u, v, _] = path.random(0);
             let normal = point.shading_normal_towards(-path.ray.direction);
@@ -354,10 +369,15 @@ impl World<'_> {
         let trial = path.trial as usize;
         let outgoing = -path.ray.direction;
         path.throughput *= point.absorption(self.scene, outgoing, hit.t);
+        if let Some(LookUp { probability, radiance, .. }) = look_up {
+            // What comes of this one counts for those that are taken for diffuse altogether, less what these have.
+            path.throughput /= probability;
+            ws.lores[trial] -= path.throughput * radiance * (1.0 - probability);
+        }
         let facing = point.shading_normal_towards(outgoing);
         let lobes = match look_up {
-            // The radiosity solution reflects everything diffusely that is no perfect mirror.
-            Some(_) => Lobes::MIRRORS,
+            // To the radiosity solution everything is diffuse that is no perfect mirror.
+            Some(_) => Lobes { threshold: 0.0, mirrors: true, ..self.gather_lobes },
             None if path.gathers => self.gather_lobes,
             None => Lobes { least_roughness: 0.0, ..self.gather_lobes },
         };
@@ -387,10 +407,13 @@ impl World<'_> {
             Some(caustics) if path.gathers => caustics.unbending(self.scene, point, outgoing),
             _ => None,
         };
-        // Paths from rough reflection have a share in light sources where nothing is interpolated; none start where radiosity is looked up.
-        let shares = path.gathers && unbending.is_none() && look_up.is_none();
+        // Paths from rough reflection have a share in light sources where nothing is interpolated.
+        let shares = path.gathers && unbending.is_none();
         if let (Some(light), Some(guided)) = (light, met.lit) {
-            let scattered = self.scattered(&bsdf, unbending.as_ref(), shares, light);
+            let scattered = match look_up {
+                None => self.scattered(&bsdf, unbending.as_ref(), shares, light),
+                Some(look_up) => self.scattered_far(&bsdf, unbending.is_some(), look_up, &path, light),
+            };
             shine(ws, &path, point, scattered, light, guided);
         }
         let wanted = if path.gathers { passes.lores } else { passes.hires || capture.is_some() };
@@ -414,12 +437,19 @@ impl World<'_> {
         {
             ws.lores[trial] += path.throughput * diffuse * light;
             low = bsdf.albedo_rough();
-            // Little light is left: some paths gather it for all.
-            rough_share = Some((PATHS_PER_ALBEDO * low.max_element()).min(1.0));
+            rough_share = Some(rough_probability(low));
         }
 
         let choose_high = choose_high(low, high);
-        let goes_on = look_up.is_none() && passes.lores && low != Vec3::ZERO;
+        if let Some(look_up) = look_up {
+            let diffuse =
+                if look_up.rough { share_of(bsdf.albedo_diffuse(), bsdf.mean_albedo_low()) } else { Vec3::ONE };
+            // Both ways of going on from here are taken by chance, this one is not.
+            ws.lores[trial] += path.throughput * look_up.radiance * diffuse;
+            low = if look_up.rough { bsdf.albedo_rough() } else { Vec3::ZERO };
+            rough_share = Some((rough_probability(low) / look_up.probability).min(1.0));
+        }
+        let goes_on = passes.lores && low != Vec3::ZERO;
         let u = if choose_high > 0.0 || goes_on { path.random(1) } else { [0.0; 4] };
         if u[3] < choose_high {
             let Some(sample) = bsdf.sample_high([u[0], u[1], u[2]]) else { return };
@@ -441,10 +471,6 @@ impl World<'_> {
             return;
         }
         let throughput = path.throughput / (1.0 - choose_high);
-        if let Some(look_up) = look_up {
-            ws.lores[trial] += throughput * look_up.radiance;
-            return;
-        }
         if !goes_on {
             return;
         }
@@ -456,7 +482,8 @@ impl World<'_> {
         };
         let Some(sample) = sample else { return };
         rest /= share;
-        let arrival = match bsdf.pdf_rough(sample.direction).filter(|_| shares) {
+        let pdf = if look_up.is_some() { sample.pdf } else { bsdf.pdf_rough(sample.direction).filter(|_| shares) };
+        let arrival = match pdf {
             Some(pdf) => Arrival::Glossy { pdf, position: point.position, normal: facing },
             None => Arrival::Soft,
         };
@@ -472,7 +499,8 @@ impl World<'_> {
         };
         let Some((mut next, rest)) = roulette(next, rest) else { return };
         if let Some(far) = &self.far {
-            next.near = far.r_thresh * (0.5 + rest);
+            // What the far field reflects is in the far field.
+            next.near = if look_up.is_some() { 0.0 } else { far.r_thresh * (0.5 + rest) };
         }
         match (path.gathers, capture) {
             (false, Some(captured)) => {
@@ -495,6 +523,34 @@ impl World<'_> {
         let (high, high_pdf) = bsdf.eval_high(light.direction);
         let rough_pdf = bsdf.pdf_rough(light.direction).filter(|_| shares).unwrap_or(0.0);
         bsdf.eval_low(light.direction) * share(rough_pdf) + high * share(high_pdf)
+    }
+
+    /// The same where the rest is looked up: rough and glossy reflection, and all of it where direct light is not in the radiosity. `bends`:
+    /// whether photons carry the light that the point bends.
+    fn scattered_far(&self, bsdf: &Bsdf, bends: bool, look_up: LookUp, path: &Path, light: &LightSample) -> Vec3 {
+        let share = |other: f32| light.pdf.map_or(1.0, |pdf| pdf / (pdf + other));
+        let mut reflected = Vec3::ZERO;
+        if !(bends && self.caustics.is_some_and(|caustics| caustics.carry(light))) {
+            let (high, pdf) = bsdf.eval_high(light.direction);
+            reflected += high * share(pdf);
+        }
+        if look_up.rough {
+            let (rough, pdf) = bsdf.eval_rough(light.direction);
+            reflected += rough * share(pdf);
+        }
+        if look_up.unlit {
+            let diffuse =
+                if look_up.rough { bsdf.eval_diffuse(light.direction) } else { bsdf.eval_low(light.direction) };
+            return diffuse + reflected;
+        }
+        // What is little against what is looked up is brought by some paths for all.
+        let brings = (reflected * light.weight).element_sum();
+        let survival = (brings / (LITTLE * look_up.radiance.element_sum()).max(f32::MIN_POSITIVE)).min(1.0);
+        if survival > 0.0 && path.random(0)[3] < survival * look_up.probability {
+            reflected / survival
+        } else {
+            Vec3::ZERO
+        }
     }
 
     /// Share of met emission that counts: the rest is next-event estimation's at the start of the ray.
@@ -551,6 +607,25 @@ fn roulette(path: Path, u: f32) -> Option<(Path, f32)> {
     let most = if path.depth < CERTAIN_DEPTH { 1.0 } else { CERTAIN_SURVIVAL };
     let survival = if path.depth < ROULETTE_DEPTH { 1.0 } else { path.throughput.max_element().min(most) };
     (u < survival).then(|| (Path { throughput: path.throughput / survival, ..path }, u / survival))
+}
+
+/// Probability of following rough reflection apart from diffuse: little light is left, and some paths bring it for all.
+fn rough_probability(albedo: Vec3) -> f32 {
+    (PATHS_PER_ALBEDO * albedo.max_element()).min(1.0)
+}
+
+/// Bound of the albedo of a material's rough reflection towards directions with this cosine, in 0..=1; 1 where its reflection may be anything.
+fn most_specular(material: &Material, cosine: f32) -> f32 {
+    if material.is_emitter() || material.may_be_sharp() || material.metallic > 0.0 {
+        return 1.0;
+    }
+    let f0 = fresnel::at_normal(material.ior) * material.specular_color.max_element();
+    material.specular * (f0 + (1.0 - f0) * fresnel::schlick_weight(cosine)).min(1.0)
+}
+
+/// `part / whole` by band; nothing of nothing.
+fn share_of(part: Vec3, whole: Vec3) -> Vec3 {
+    Vec3::select(whole.cmpgt(Vec3::ZERO), part / whole, Vec3::ZERO)
 }
 
 /// Probability of going on along the highly directional part. Square roots keep weak but sharp reflections of light sources

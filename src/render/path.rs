@@ -115,6 +115,10 @@ pub struct LookUp {
     pub radiance: Vec3,
     /// Whether direct light is not in it and is to be sampled at the point.
     pub unlit: bool,
+    /// Whether rough reflection, which is in it as if it were diffuse, is to be followed instead.
+    pub rough: bool,
+    /// Probability with which what is not in it is worked out: the others are taken for diffuse.
+    pub probability: f32,
 }
 
 /// Where a path's ray met a surface of the scene.

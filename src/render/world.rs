@@ -61,7 +61,7 @@ pub struct FarField<'a> {
     pub geometry: &'a SimplifiedGeometry,
     /// Radiosities of their patches.
     pub solution: &'a Solution,
-    /// Which of its triangles reflect only diffusely as far as radiosity is concerned, and emit nothing.
+    /// Which of its triangles emit nothing and reflect nothing but what is looked up.
     pub plain: &'a [bool],
     /// Mean length of a gather ray's near part; 0 for PMM.
     pub r_thresh: f32,
@@ -83,11 +83,12 @@ impl FarField<'_> {
         self.solution.radiosity(hit.triangle, hit.u, hit.v, front) * FRAC_1_PI
     }
 
-    /// What is used of that: without direct light where the patch's mean says little of this very point.
-    pub fn look_up(&self, hit: &Hit, direction: Vec3) -> LookUp {
+    /// What is used of that: without direct light where the patch's mean says little of this very point, and without rough reflection of what is
+    /// `glossy` where there is a near field. PMM is the paper's.
+    pub fn look_up(&self, hit: &Hit, direction: Vec3, glossy: bool) -> LookUp {
         let front = self.solution.is_front(hit.triangle, direction);
-        let (all, uneven) = self.solution.look_up(hit.triangle, hit.u, hit.v, front);
-        LookUp { radiance: (all - uneven.unwrap_or(Vec3::ZERO)) * FRAC_1_PI, unlit: uneven.is_some() }
+        let (radiosity, unlit) = self.solution.look_up(hit.triangle, hit.u, hit.v, front);
+        LookUp { radiance: radiosity * FRAC_1_PI, unlit, rough: self.r_thresh > 0.0 && glossy, probability: 1.0 }
     }
 }
 

@@ -5,7 +5,7 @@ use std::f32::consts::FRAC_1_PI;
 use glam::{Vec2, Vec3, Vec4};
 
 use super::SurfacePoint;
-use super::layered::{Layered, Local};
+use super::layered::{self, Layered, Local};
 use crate::sampling::{basis, cosine_hemisphere};
 use crate::scene::{Scene, TextureSlot};
 
@@ -57,11 +57,13 @@ pub struct Lobes {
     /// Smoother reflection of opaque surfaces is taken to be this rough (a bias: reflections blur, energy is kept). What is at
     /// least as rough as the threshold leaves no opaque surface highly directional. Zero changes nothing.
     pub least_roughness: f32,
+    /// Whether perfectly smooth reflection stays as it is all the same.
+    pub mirrors: bool,
 }
 
 impl Lobes {
     /// Only perfectly smooth reflection is highly directional.
-    pub const MIRRORS: Lobes = Lobes { threshold: 0.0, least_roughness: 0.0 };
+    pub const MIRRORS: Lobes = Lobes { threshold: 0.0, least_roughness: 0.0, mirrors: true };
 }
 
 impl Bsdf {
@@ -85,7 +87,7 @@ impl Bsdf {
             };
             let surface = texel(&material.metallic_roughness_texture).unwrap_or(Vec4::ONE);
             let mut roughness = material.roughness * surface.y;
-            if material.transmission == 0.0 {
+            if material.transmission == 0.0 && !(lobes.mirrors && layered::is_smooth(roughness)) {
                 roughness = roughness.max(lobes.least_roughness);
             }
             let at = Local {
@@ -137,6 +139,12 @@ impl Bsdf {
         self.layered.as_ref().map_or(Vec3::ZERO, Layered::albedo_rough)
     }
 
+    /// Mean of [`Bsdf::albedo_low`] over outgoing directions, weighted by their cosine: the reflectance of a diffuse surface that reflects
+    /// as much.
+    pub fn mean_albedo_low(&self) -> Vec3 {
+        self.layered.as_ref().map_or(self.reflectance, Layered::mean_albedo_low)
+    }
+
     /// The same of the highly directional part (reflection and transmission): the share of power that goes on,
     /// without the change of radiance by the index of refraction.
     pub fn albedo_high(&self) -> Vec3 {
@@ -157,6 +165,23 @@ impl Bsdf {
         match &self.layered {
             None => self.reflectance * (self.shading_normal.dot(incoming).max(0.0) * FRAC_1_PI),
             Some(layered) => layered.eval_low(incoming).0,
+        }
+    }
+
+    /// The part of [`Bsdf::eval_low`] that is no rough reflection.
+    pub fn eval_diffuse(&self, incoming: Vec3) -> Vec3 {
+        match &self.layered {
+            Some(layered) if self.geometric_normal.dot(incoming) > 0.0 => layered.eval_diffuse(incoming),
+            Some(_) => Vec3::ZERO,
+            None => self.eval_low(incoming),
+        }
+    }
+
+    /// The rest of it, and the density of [`Bsdf::sample_rough`].
+    pub fn eval_rough(&self, incoming: Vec3) -> (Vec3, f32) {
+        match &self.layered {
+            Some(layered) if self.geometric_normal.dot(incoming) > 0.0 => layered.eval_rough(incoming),
+            _ => (Vec3::ZERO, 0.0),
         }
     }
 

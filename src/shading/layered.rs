@@ -66,6 +66,8 @@ pub struct Layered {
     diffuse_albedo: Vec3,
     /// One over the cosine-weighted average of what the coat lets through.
     diffuse_scale: Vec3,
+    /// Cosine-weighted average over `outgoing` of the weakly directional part's albedo.
+    mean_albedo_low: Vec3,
     coat: Coat,
     glass: Option<Glass>,
 }
@@ -92,6 +94,11 @@ fn multiple_color(f0: Vec3, f90: Vec3, average: f32) -> Vec3 {
     f * f * average / (Vec3::ONE - f * (1.0 - average))
 }
 
+/// Whether a lobe of this roughness is a delta function.
+pub fn is_smooth(roughness: f32) -> bool {
+    roughness * roughness < SMOOTH_ALPHA
+}
+
 fn luminous(v: Vec3) -> f32 {
     v.element_sum()
 }
@@ -108,7 +115,7 @@ impl Layered {
             _ => at.roughness,
         };
         let alpha = roughness * roughness;
-        let smooth = alpha < SMOOTH_ALPHA;
+        let smooth = is_smooth(roughness);
 
         let facing = at.normal.dot(at.outgoing);
         let normal = if facing < MIN_VIEW_COSINE {
@@ -140,20 +147,25 @@ impl Layered {
         }
         let f0 = at.metallic * at.base_color + opaque * coat.f0;
         let f90 = Vec3::splat(at.metallic) + opaque * coat.f90;
+        let specular_is_high = smooth || roughness < glossy_threshold;
+        let let_through = (Vec3::ONE - coat.albedo(average)).max(Vec3::splat(f32::MIN_POSITIVE));
+        let mean_diffuse = opaque * at.base_color * let_through + multiple * (1.0 - average.total());
+        let mean_rough = if specular_is_high { Vec3::ZERO } else { average.with(f0, f90) };
         Layered {
             frame,
             outgoing,
             roughness,
             alpha,
             smooth,
-            specular_is_high: smooth || roughness < glossy_threshold,
+            specular_is_high,
             f0,
             f90,
             specular_albedo: here.with(f0, f90),
             multiple_albedo: multiple * (1.0 - here.total()).max(0.0),
             multiple_scale,
             diffuse_albedo: opaque * at.base_color * (Vec3::ONE - coat.albedo(here)).max(Vec3::ZERO),
-            diffuse_scale: (Vec3::ONE - coat.albedo(average)).max(Vec3::splat(f32::MIN_POSITIVE)).recip(),
+            diffuse_scale: let_through.recip(),
+            mean_albedo_low: mean_diffuse + mean_rough,
             coat,
             glass,
         }
@@ -172,6 +184,11 @@ impl Layered {
     /// Albedo of rough specular reflection.
     pub fn albedo_rough(&self) -> Vec3 {
         if self.specular_is_high { Vec3::ZERO } else { self.specular_albedo }
+    }
+
+    /// Cosine-weighted average over outgoing directions of [`Layered::albedo_low`].
+    pub fn mean_albedo_low(&self) -> Vec3 {
+        self.mean_albedo_low
     }
 
     /// A direction (world) from the rough specular lobe alone, its `f cos / pdf` and `pdf`.
@@ -211,6 +228,16 @@ impl Layered {
         self.low(self.frame.transpose() * incoming)
     }
 
+    /// The part of [`Layered::eval_low`] that is no rough reflection.
+    pub fn eval_diffuse(&self, incoming: Vec3) -> Vec3 {
+        self.diffuse(self.frame.transpose() * incoming)
+    }
+
+    /// The rest of it, and the density of [`Layered::sample_rough`].
+    pub fn eval_rough(&self, incoming: Vec3) -> (Vec3, f32) {
+        self.rough(self.frame.transpose() * incoming)
+    }
+
     /// A direction (world), `f_l cos / pdf` and `pdf`. The two lobes are one mixture density.
     pub fn sample_low(&self, u: [f32; 3]) -> Option<(Vec3, Vec3, f32)> {
         let incoming = if u[0] < self.diffuse_share() {
@@ -237,20 +264,28 @@ impl Layered {
         if incoming.z <= 0.0 {
             return (Vec3::ZERO, 0.0);
         }
+        let share = self.diffuse_share();
+        let (rough, rough_pdf) = self.rough(incoming);
+        (self.diffuse(incoming) + rough, share * incoming.z * FRAC_1_PI + (1.0 - share) * rough_pdf)
+    }
+
+    fn diffuse(&self, incoming: Vec3) -> Vec3 {
+        if incoming.z <= 0.0 {
+            return Vec3::ZERO;
+        }
         let there =
             if self.smooth { albedo::smooth(incoming.z) } else { albedo::directional(incoming.z, self.roughness) };
-        let lambert = incoming.z * FRAC_1_PI;
         let through = (Vec3::ONE - self.coat.albedo(there)).max(Vec3::ZERO) * self.diffuse_scale;
         let caught = (1.0 - there.total()).max(0.0) * self.multiple_scale;
-        let mut value = (self.diffuse_albedo * through + self.multiple_albedo * caught) * lambert;
-        let share = self.diffuse_share();
-        let mut pdf = share * lambert;
-        if !self.specular_is_high {
-            let lobe = Reflection::new(self.outgoing, incoming, self.alpha);
-            value += self.schlick(lobe.along) * lobe.value;
-            pdf += (1.0 - share) * lobe.pdf;
+        (self.diffuse_albedo * through + self.multiple_albedo * caught) * (incoming.z * FRAC_1_PI)
+    }
+
+    fn rough(&self, incoming: Vec3) -> (Vec3, f32) {
+        if self.specular_is_high || incoming.z <= 0.0 {
+            return (Vec3::ZERO, 0.0);
         }
-        (value, pdf)
+        let lobe = Reflection::new(self.outgoing, incoming, self.alpha);
+        (self.schlick(lobe.along) * lobe.value, lobe.pdf)
     }
 
     fn schlick(&self, along: f32) -> Vec3 {

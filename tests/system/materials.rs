@@ -152,3 +152,35 @@ fn all_materials_agree_with_path_tracing() {
         assert!((got.mean - exact.mean).abs() < bound, "ball {i}: {got:?} {exact:?}");
     }
 }
+
+/// Light that comes under a screen, by way of a floor of rough metal: a wall far away gets what the floor reflects forward. Taken for diffuse, as the
+/// radiosity solution does, the floor would give it two thirds of that.
+#[test]
+fn rough_reflection_far_away_has_a_direction() {
+    use crate::common::Body;
+    let bodies = [
+        Body::block([0.0; 3], [4.0, 3.0, 5.0], true, 0.3, 0.0),
+        Body::block([0.0, 0.001, 0.0], [4.0, 0.02, 5.0], false, 0.8, 0.0),
+        Body::block([0.0, 1.0, 2.5], [4.0, 3.0, 2.6], false, 0.3, 0.0),
+        Body::block([1.5, 1.8, 4.5], [2.5, 2.2, 4.9], false, 0.0, 10.0),
+    ];
+    let mut scene = common::scene(&common::gltf(&bodies, [2.0, 0.8, 2.4]));
+    let floor = &mut Arc::make_mut(&mut scene).materials[1];
+    (floor.metallic, floor.roughness) = (1.0, 0.4);
+    let film = |method: Method, trials: u32, seed: u32| {
+        let prepared = prepare(&scene, settings(method)).0;
+        render(&prepared, &fixed(SIZE[0], SIZE[1], trials, seed)).film
+    };
+    let (reference, film) = (film(Method::Mcpt, 2048, 1), film(Method::Gsii, 512, 2));
+    // The upper part of the picture shows the wall.
+    for rows in [0..SIZE[1] / 4, SIZE[1] / 4..SIZE[1] / 2] {
+        let inside = |x: u32, y: u32| x.abs_diff(SIZE[0] / 2) < 12 && rows.contains(&y);
+        let (exact, got) = (Estimate::of(&reference, inside), Estimate::of(&film, inside));
+        let error = exact.error.hypot(got.error);
+        println!("rows {rows:?}: {:.4} +- {:.4}", got.mean / exact.mean, error / exact.mean);
+        // Patches still are even, and the radiosity solution has a statistical error of its own.
+        let bound = 0.03 * exact.mean + threshold(ALPHA, 2) * error;
+        assert!((got.mean - exact.mean).abs() < bound, "rows {rows:?}: {got:?} {exact:?}");
+        assert!(bound < 0.2 * exact.mean, "the test says something: {error}");
+    }
+}

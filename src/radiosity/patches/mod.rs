@@ -237,12 +237,19 @@ impl PatchMap {
 
     /// The patch at barycentrics `u`, `v` of a triangle.
     pub fn at(&self, triangle: u32, u: f32, v: f32) -> u32 {
+        self.locate(triangle, u, v).0
+    }
+
+    /// The same, with the coordinates in the grid's cell, 0..=1.
+    #[inline]
+    pub fn locate(&self, triangle: u32, u: f32, v: f32) -> (u32, Vec2) {
         let map = &self.maps[triangle as usize];
         let at = map.origin + u * map.du + v * map.dv;
         // A cast from float saturates: below zero becomes 0.
         let x = (at.x as u32).min(u32::from(map.cells[0]) - 1);
         let y = (at.y as u32).min(u32::from(map.cells[1]) - 1);
-        self.cells[(map.first + y * u32::from(map.cells[0]) + x) as usize]
+        let patch = self.cells[(map.first + y * u32::from(map.cells[0]) + x) as usize];
+        (patch, (at - Vec2::new(x as f32, y as f32)).clamp(Vec2::ZERO, Vec2::ONE))
     }
 }
 

@@ -200,7 +200,8 @@ fn rad_012_and_013_energy_after_every_shot() {
     let patches = Patches::new(&room.geometry, &[], &RadiosityParams::new(0.25)).unwrap();
     let optics = Optics::new(&input, &patches).unwrap();
     let tracer = Tracer { input: &input, patches: &patches, optics: &optics };
-    let mut arrived = Arrived::new(vec![DVec3::ZERO; 2 * patches.len()], vec![None; 2 * patches.len()], 16, 6);
+    let mut arrived =
+        Arrived::new(vec![DVec3::ZERO; 2 * patches.len()], Whereabouts::nowhere(2 * patches.len()), 16, 6);
     let light = emit::shoot_all(&tracer, 10_000, &mut arrived, 7);
     let emitted = light.flux.x;
     assert_close("emitted", emitted, 6.0 + 0.3 * 3.0, 1e-6);

@@ -11,7 +11,7 @@ fn form_factor(room: &Room, rays: u32, seed: u32) -> f64 {
     let patches = Patches::new(&room.geometry, &[], &RadiosityParams::new(1e9)).unwrap();
     let optics = Optics::new(&room.input(), &patches).unwrap();
     let tracer = Tracer { input: &room.input(), patches: &patches, optics: &optics };
-    let mut arrived = Arrived::new(vec![DVec3::ZERO; 2 * patches.len()], Vec::new(), 0, 0);
+    let mut arrived = Arrived::new(vec![DVec3::ZERO; 2 * patches.len()], Whereabouts::default(), 0, 0);
     let flux = DVec3::splat(1.0 / f64::from(rays));
     tracer.shoot(&[Shot { side: 0, rays, flux, stream: seed, from: None }], &mut arrived);
     let incident = arrived.flux;

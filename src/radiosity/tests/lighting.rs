@@ -80,12 +80,17 @@ fn gathered_and_shot_light_agree() {
     assert!(rms < 0.02);
 }
 
+/// A bright point.
+pub(super) fn point_light(position: Vec3) -> PunctualLight {
+    light(1e4, LightKind::Point { position })
+}
+
 /// A square floor around the origin, one unit wide, under walls that hide what they hide from it.
-fn floor_under(walls: &[[Vec3; 4]], lamps: &[Vec3]) -> Room {
+pub(super) fn floor_under(walls: &[[Vec3; 4]], lamps: &[Vec3]) -> Room {
     let p = |x: f32, y: f32| Vec3::new(x, y, 0.0);
     let floor = [p(-0.5, -0.5), p(0.5, -0.5), p(0.5, 0.5), p(-0.5, 0.5)];
     let surfaces = std::iter::once(&floor).chain(walls).map(|square| (diced(*square, 1), material(0.5, 0.0)));
-    let lamps = lamps.iter().map(|&position| light(1e4, LightKind::Point { position })).collect();
+    let lamps = lamps.iter().copied().map(point_light).collect();
     Room::new(surfaces.collect(), lamps)
 }
 

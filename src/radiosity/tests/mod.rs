@@ -5,6 +5,7 @@ mod closed;
 mod form_factors;
 mod lighting;
 mod patches;
+mod slopes;
 
 use std::time::Instant;
 
