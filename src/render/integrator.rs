@@ -399,6 +399,9 @@ impl World<'_> {
             }
         }
         if path.depth >= self.max_depth {
+            if let Some(look_up) = look_up {
+                ws.lores[trial] += path.throughput * look_up.radiance;
+            }
             return;
         }
 
