@@ -7,7 +7,7 @@
 //! |---|---|---|
 //! | emitted, `L_h` of light sources | `E S* L` | HIRES: emission at the end of the view chain |
 //! | `L_{l,s}` | `E S* D L` | HIRES: next-event estimation; a glossy lobe shares it with its own rays (balance heuristic) |
-//! | `L_{l,l}` beyond `r_thresh` | `E S* D .. D` | LORES: radiosity less emission of the patch that is hit, Eq. (3) first part; of a patch on which direct light varies only what reflected light brings, and direct light at the point |
+//! | `L_{l,l}` beyond `r_thresh` | `E S* D .. D` | LORES: radiosity less emission of the patch that is hit, Eq. (3) first part; of a patch on which direct light varies only what reflected light brings, and direct light at the point; rough reflection there goes on in the simplified scene |
 //! | `L_{l,l}` within `r_thresh` | `E S* D D ..` | LORES: direct light at the near point and the same gather again, Eq. (3) second part |
 //! | `L_{l,h}` | `E S* D S+ D ..` | LORES: the gather ray goes on through mirrors and glass |
 //! | `L_{l,c}` from small light sources | `E S* D S+ L` | HIRES: photons; LORES where gather rays meet the `D` (see [`caustics`](super::caustics)) |
