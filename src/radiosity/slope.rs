@@ -6,9 +6,8 @@
 //! mean and covariance over the open part of the side, and `c` the centroid of the light. The fit's relative variance over the side is
 //! `(c - m) C^-1 (c - m)`.
 //!
-//! Both halves of a solution have centroids of their own. A side has a slope where these agree more than they differ. That lets a third of the sides
-//! with even light have one by chance, which adds noise to what is looked up but no bias; asking for more leaves out those that few rays met, and the
-//! light between the slats of a blind stays too bright on average.
+//! A side has a slope where that is more than what chance makes of the rays that brought the light. Slopes of chance would have no bias, but make
+//! what single gather rays bring noisier.
 
 use glam::{DMat2, DVec2, DVec3, Vec2};
 use rayon::prelude::*;
@@ -20,6 +19,9 @@ use crate::simplify::SimplifiedGeometry;
 
 /// Least relative standard deviation of the fit over a side: less is nothing to the errors of single patches.
 const LEAST: f64 = 0.1;
+/// The fit's relative variance is at least this multiple of what chance makes of even light, for each of its two dimensions: that makes a slope of one
+/// side in a hundred (chi-square).
+const CERTAIN: f64 = 9.2;
 /// Points that stand for the open part of a side.
 const POINTS: u32 = 64;
 /// Added to the covariance of cell coordinates, whose variance over a full cell is 1/12: slivers have no second direction.
@@ -29,22 +31,30 @@ const MIDDLE: DVec2 = DVec2::splat(0.5);
 
 /// Flux, all bands together, and its first moments in cell coordinates about the middle of the cell, W.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Moments(DVec3);
+pub(super) struct Moments {
+    /// Moments of first order, and the flux itself.
+    sum: DVec3,
+    /// Squares of the flux of single rays, W^2.
+    squares: f64,
+}
 
 impl Moments {
     /// Adds light that arrived at cell coordinates `local`, 0..=1.
     pub fn add(&mut self, flux: f64, local: Vec2) {
-        self.0 += flux * (local.as_dvec2() - MIDDLE).extend(1.0);
+        self.sum += flux * (local.as_dvec2() - MIDDLE).extend(1.0);
+        self.squares += flux * flux;
     }
 
     /// Adds `weight` times what `all` has more than `part`.
     pub fn add_rest(&mut self, weight: f64, all: Moments, part: Moments) {
-        self.0 += weight * (all.0 - part.0);
+        self.sum += weight * (all.sum - part.sum);
+        self.squares += weight * weight * (all.squares - part.squares);
     }
 
-    /// Centroid about the middle of the cell; `None` without light.
-    fn centroid(self) -> Option<DVec2> {
-        (self.0.z > 0.0).then(|| self.0.truncate() / self.0.z)
+    /// Centroid about the middle of the cell, and one over the number of equal rays that would make it as uncertain; `None` without light.
+    fn centroid(self) -> Option<(DVec2, f64)> {
+        let flux = self.sum.z;
+        (flux > 0.0).then(|| (self.sum.truncate() / flux, self.squares / (flux * flux)))
     }
 }
 
@@ -63,9 +73,9 @@ impl Slope {
         (1.0 + self.change.dot(local - self.mean)).max(0.0)
     }
 
-    /// The fit to both halves' `moments`, where they agree on one that is worth it.
+    /// The fit to both halves' `moments`, where it is certain and worth it.
     fn fit(geometry: &SimplifiedGeometry, patches: &Patches, side: u32, moments: [Moments; 2]) -> Option<Slope> {
-        let [Some(a), Some(b)] = moments.map(Moments::centroid) else { return None };
+        let [Some((a, per_a)), Some((b, per_b))] = moments.map(Moments::centroid) else { return None };
         // Of a cell that is full and open. Most sides end here.
         if 12.0 * a.dot(b) < LEAST * LEAST {
             return None;
@@ -84,13 +94,12 @@ impl Slope {
             .iter()
             .fold(DMat2::from_diagonal(DVec2::splat(LEAST_VARIANCE)), |sum, &p| sum + square(p - mean) * per_point);
         let inverse = covariance.inverse();
-        let (a, b) = (a - mean, b - mean);
-        let variance = a.dot(inverse * b);
-        let half = 0.5 * (a - b);
-        if variance < LEAST * LEAST || variance < half.dot(inverse * half) {
+        let centroid = 0.5 * (a + b) - mean;
+        let variance = centroid.dot(inverse * centroid);
+        if variance < (CERTAIN * 0.25 * (per_a + per_b)).max(LEAST * LEAST) {
             return None;
         }
-        let change = inverse * (0.5 * (a + b));
+        let change = inverse * centroid;
         // No negative light: as steep as that allows, so that the mean stays what it is.
         let lowest = points.iter().map(|&p| change.dot(p - mean)).fold(0.0, f64::min);
         let change = change * (-1.0 / lowest).clamp(0.0, 1.0);
