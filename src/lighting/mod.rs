@@ -50,6 +50,13 @@ pub struct LightSample {
     pub triangle: u32,
 }
 
+impl LightSample {
+    /// Share in the light of its direction where rays with density `other` may meet it too (balance heuristic); all of what no ray can hit.
+    pub fn share(&self, other: f32) -> f32 {
+        self.pdf.map_or(1.0, |pdf| pdf / (pdf + other))
+    }
+}
+
 /// All light sources of a scene, ready to be sampled.
 #[derive(Debug)]
 pub struct Lights {

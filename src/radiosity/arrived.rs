@@ -103,10 +103,8 @@ impl Whereabouts {
 pub(super) struct Arrived {
     /// Flux, W.
     pub flux: Vec<DVec3>,
-    /// Where it arrived; empty where that is not remembered.
-    pub moments: Vec<Moments>,
-    /// The same since the side last shot, as places to shoot from; empty with `moments`.
-    places: Vec<Option<Places>>,
+    /// Where it arrived: as moments all of it, as places what arrived since the side last shot.
+    at: Whereabouts,
     /// Points wanted of a side.
     wanted: usize,
     /// For random numbers.
@@ -117,23 +115,28 @@ pub(super) struct Arrived {
 impl Arrived {
     /// `flux` on each side, and where that arrived, `at`, if it is to be remembered: about `wanted` places for each side, from now on.
     pub fn new(flux: Vec<DVec3>, at: Whereabouts, wanted: usize, stream: u32) -> Self {
-        Arrived { flux, moments: at.moments, places: at.places, wanted, stream, count: 0 }
+        Arrived { flux, at, wanted, stream, count: 0 }
     }
 
     /// Adds light.
     pub fn add(&mut self, Landing { side, flux, place, local }: Landing) {
         self.flux[side as usize] += flux;
-        if let Some(places) = self.places.get_mut(side as usize) {
-            self.moments[side as usize].add(flux.element_sum(), local);
+        if let Some(places) = self.at.places.get_mut(side as usize) {
+            self.at.moments[side as usize].add(flux.element_sum(), local);
             self.count = self.count.wrapping_add(1);
             let random = sampling::unit(sampling::hash(self.stream ^ self.count));
             places.get_or_insert_with(|| Places::new(self.wanted)).offer(place, flux.element_sum(), random);
         }
     }
 
+    /// Where light arrived, one entry a side; none where that is not remembered.
+    pub fn moments(&self) -> &[Moments] {
+        &self.at.moments
+    }
+
     /// Takes the places of what a side shoots now; `None` where they are not remembered.
     pub fn take_places(&mut self, side: u32) -> Option<Places> {
-        self.places.get_mut(side as usize)?.take()
+        self.at.places.get_mut(side as usize)?.take()
     }
 }
 

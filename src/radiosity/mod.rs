@@ -214,7 +214,7 @@ struct Average {
     sums: [Vec<DVec3>; 2],
     /// Incident flux of each side straight from light sources, where it is uneven.
     uneven: Vec<Option<DVec3>>,
-    /// Where the light arrived that is looked up, as `sums`; without light where it is not known.
+    /// Where the light arrived that is looked up, as `sums`; empty where it is not known.
     moments: [Vec<Moments>; 2],
     weight: f64,
     ledger: Ledger,
@@ -228,7 +228,7 @@ impl Average {
         Average {
             sums: [vec![DVec3::ZERO; sides], vec![DVec3::ZERO; sides]],
             uneven: vec![None; sides],
-            moments: [vec![Moments::default(); sides], vec![Moments::default(); sides]],
+            moments: [Vec::new(), Vec::new()],
             weight: 0.0,
             ledger: Ledger::default(),
             rays: 0,
@@ -331,6 +331,7 @@ impl Average {
             for (sum, flux) in self.sums[half].iter_mut().zip(run.incident(params.ambient)) {
                 *sum += weight * flux;
             }
+            self.moments[half].resize(run.moments().len(), Moments::default());
             // What is looked up of an uneven side is reflected light alone.
             for (side, moments) in run.moments().iter().enumerate() {
                 let direct = gathered.filter(|_| self.uneven[side].is_some()).map(|g| g.at[half].moments[side]);

@@ -109,7 +109,7 @@ impl<'a> Run<'a> {
 
     /// Where light arrived, one entry a side; none where that is not known.
     pub fn moments(&self) -> &[Moments] {
-        &self.arrived.moments
+        self.arrived.moments()
     }
 
     /// Rays traced so far.

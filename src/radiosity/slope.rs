@@ -107,9 +107,14 @@ impl Slope {
     }
 }
 
-/// The slopes of those sides that have one, in ascending order, from the moments of both halves.
+/// The slopes of those sides that have one, in ascending order, from the moments of both halves. Equivalent boxes are looked up as they are.
 pub(super) fn find(geometry: &SimplifiedGeometry, patches: &Patches, moments: &[Vec<Moments>; 2]) -> Vec<(u32, Slope)> {
     let [a, b] = moments;
-    let fit = |(side, (&a, &b))| Some((side as u32, Slope::fit(geometry, patches, side as u32, [a, b])?));
+    let fit = |(side, (&a, &b)): (usize, (&Moments, &Moments))| {
+        if patches.box_cell[side / 2].is_some() {
+            return None;
+        }
+        Some((side as u32, Slope::fit(geometry, patches, side as u32, [a, b])?))
+    };
     a.par_iter().zip(b).enumerate().filter_map(fit).collect()
 }

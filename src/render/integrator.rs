@@ -21,7 +21,8 @@ use std::time::Instant;
 use glam::Vec3;
 
 use super::film::{Feature, Tile};
-use super::path::{Arrival, LookUp, Met, Passes, Path, Shadow};
+use super::look_up::{LookUp, rough_probability};
+use super::path::{Arrival, Met, Passes, Path, Shadow};
 use super::view::ViewRays;
 use super::workspace::Workspace;
 use super::world::{Batch, Captured, FarField, World};
@@ -30,8 +31,8 @@ use crate::backend::{Coherence, Hit, Ray, Visible};
 use crate::lighting::guide::Guided;
 use crate::lighting::shadow::{ShadowRay, light_visibility};
 use crate::lighting::{LightSample, Lit};
-use crate::scene::{Camera, Material};
-use crate::shading::{Bsdf, Lobes, SurfacePoint, fresnel};
+use crate::scene::Camera;
+use crate::shading::{Bsdf, Lobes, SurfacePoint};
 use crate::simplify::TriangleSource;
 
 /// A far ray starts this much (relative) before the near one ended, so that nothing falls between the two.
@@ -56,12 +57,6 @@ const GATHER_FOOTPRINT: f32 = 0.05;
 
 /// Points that are shaded together: as many as stay close to the processor.
 const MET_AT_ONCE: usize = 128;
-
-/// Share of paths that gather rough reflection apart from diffuse, per unit of its albedo.
-const PATHS_PER_ALBEDO: f32 = 4.0;
-
-/// Share of looked-up radiance above which what a light source adds by rough reflection is always brought.
-const LITTLE: f32 = 0.5;
 
 /// From this trial on a tile remembers where it finds light: images of fewer trials have no use for that.
 pub(super) const LEARN_FROM: u32 = 16;
@@ -282,18 +277,11 @@ impl World<'_> {
             ws.lores[path.trial as usize] += path.throughput * far.reflected(hit, path.ray.direction);
             return;
         };
-        let material = self.scene.material(triangle);
-        let mut look_up = (!near).then(|| far.look_up(hit, path.ray.direction, !material.is_lambertian()));
-        if let Some(look_up) = &mut look_up
-            && !look_up.unlit
-        {
-            let plain = far.plain[hit.triangle as usize];
-            if !plain {
-                let cosine = far.solution.cosine(hit.triangle, path.ray.direction);
-                look_up.probability = rough_probability(Vec3::splat(most_specular(material, cosine)));
-            }
-            if plain || (look_up.probability < 1.0 && path.random(0)[3] >= look_up.probability) {
-                ws.lores[path.trial as usize] += path.throughput * look_up.radiance;
+        let look_up = (!near).then(|| far.look_up(hit, path.ray.direction, self.scene.material(triangle)));
+        if let Some(LookUp { radiance, unlit: false, probability, .. }) = look_up {
+            let chosen = || probability >= 1.0 || path.random(0)[3] < probability;
+            if far.plain[hit.triangle as usize] || !chosen() {
+                ws.lores[path.trial as usize] += path.throughput * radiance;
                 return;
             }
         }
@@ -415,7 +403,10 @@ impl World<'_> {
         if let (Some(light), Some(guided)) = (light, met.lit) {
             let scattered = match look_up {
                 None => self.scattered(&bsdf, unbending.as_ref(), shares, light),
-                Some(look_up) => self.scattered_far(&bsdf, unbending.is_some(), look_up, &path, light),
+                Some(look_up) => {
+                    let carried = unbending.is_some() && self.caustics.is_some_and(|caustics| caustics.carry(light));
+                    look_up.scattered(&bsdf, carried, &path, light)
+                }
             };
             shine(ws, &path, point, scattered, light, guided);
         }
@@ -440,17 +431,15 @@ impl World<'_> {
         {
             ws.lores[trial] += path.throughput * diffuse * light;
             low = bsdf.albedo_rough();
-            rough_share = Some(rough_probability(low));
+            rough_share = Some(rough_probability(low.max_element()));
         }
 
         let choose_high = choose_high(low, high);
         if let Some(look_up) = look_up {
-            let diffuse =
-                if look_up.rough { share_of(bsdf.albedo_diffuse(), bsdf.mean_albedo_low()) } else { Vec3::ONE };
             // Both ways of going on from here are taken by chance, this one is not.
-            ws.lores[trial] += path.throughput * look_up.radiance * diffuse;
+            ws.lores[trial] += path.throughput * look_up.radiance * look_up.diffuse_share(&bsdf);
             low = if look_up.rough { bsdf.albedo_rough() } else { Vec3::ZERO };
-            rough_share = Some((rough_probability(low) / look_up.probability).min(1.0));
+            rough_share = Some((rough_probability(low.max_element()) / look_up.probability).min(1.0));
         }
         let goes_on = passes.lores && low != Vec3::ZERO;
         let u = if choose_high > 0.0 || goes_on { path.random(1) } else { [0.0; 4] };
@@ -522,38 +511,9 @@ impl World<'_> {
         {
             return unbending.eval_low(light.direction);
         }
-        let share = |other: f32| light.pdf.map_or(1.0, |pdf| pdf / (pdf + other));
         let (high, high_pdf) = bsdf.eval_high(light.direction);
         let rough_pdf = bsdf.pdf_rough(light.direction).filter(|_| shares).unwrap_or(0.0);
-        bsdf.eval_low(light.direction) * share(rough_pdf) + high * share(high_pdf)
-    }
-
-    /// The same where the rest is looked up: rough and glossy reflection, and all of it where direct light is not in the radiosity. `bends`:
-    /// whether photons carry the light that the point bends.
-    fn scattered_far(&self, bsdf: &Bsdf, bends: bool, look_up: LookUp, path: &Path, light: &LightSample) -> Vec3 {
-        let share = |other: f32| light.pdf.map_or(1.0, |pdf| pdf / (pdf + other));
-        let mut reflected = Vec3::ZERO;
-        if !(bends && self.caustics.is_some_and(|caustics| caustics.carry(light))) {
-            let (high, pdf) = bsdf.eval_high(light.direction);
-            reflected += high * share(pdf);
-        }
-        if look_up.rough {
-            let (rough, pdf) = bsdf.eval_rough(light.direction);
-            reflected += rough * share(pdf);
-        }
-        if look_up.unlit {
-            let diffuse =
-                if look_up.rough { bsdf.eval_diffuse(light.direction) } else { bsdf.eval_low(light.direction) };
-            return diffuse + reflected;
-        }
-        // What is little against what is looked up is brought by some paths for all.
-        let brings = (reflected * light.weight).element_sum();
-        let survival = (brings / (LITTLE * look_up.radiance.element_sum()).max(f32::MIN_POSITIVE)).min(1.0);
-        if survival > 0.0 && path.random(0)[3] < survival * look_up.probability {
-            reflected / survival
-        } else {
-            Vec3::ZERO
-        }
+        bsdf.eval_low(light.direction) * light.share(rough_pdf) + high * light.share(high_pdf)
     }
 
     /// Share of met emission that counts: the rest is next-event estimation's at the start of the ray.
@@ -610,25 +570,6 @@ fn roulette(path: Path, u: f32) -> Option<(Path, f32)> {
     let most = if path.depth < CERTAIN_DEPTH { 1.0 } else { CERTAIN_SURVIVAL };
     let survival = if path.depth < ROULETTE_DEPTH { 1.0 } else { path.throughput.max_element().min(most) };
     (u < survival).then(|| (Path { throughput: path.throughput / survival, ..path }, u / survival))
-}
-
-/// Probability of following rough reflection apart from diffuse: little light is left, and some paths bring it for all.
-fn rough_probability(albedo: Vec3) -> f32 {
-    (PATHS_PER_ALBEDO * albedo.max_element()).min(1.0)
-}
-
-/// Bound of the albedo of a material's rough reflection towards directions with this cosine, in 0..=1; 1 where its reflection may be anything.
-fn most_specular(material: &Material, cosine: f32) -> f32 {
-    if material.is_emitter() || material.may_be_sharp() || material.metallic > 0.0 {
-        return 1.0;
-    }
-    let f0 = fresnel::at_normal(material.ior) * material.specular_color.max_element();
-    material.specular * (f0 + (1.0 - f0) * fresnel::schlick_weight(cosine)).min(1.0)
-}
-
-/// `part / whole` by band; nothing of nothing.
-fn share_of(part: Vec3, whole: Vec3) -> Vec3 {
-    Vec3::select(whole.cmpgt(Vec3::ZERO), part / whole, Vec3::ZERO)
 }
 
 /// Probability of going on along the highly directional part. Square roots keep weak but sharp reflections of light sources

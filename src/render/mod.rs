@@ -7,6 +7,7 @@ pub mod checkpoint;
 pub mod film;
 pub mod integrator;
 pub mod layers;
+pub mod look_up;
 pub mod nearness;
 pub mod path;
 pub mod plan;

@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use super::look_up::LookUp;
 use crate::backend::{Hit, Ray};
 use crate::lighting::guide::Guided;
 use crate::sampling::SobolPoint;
@@ -106,19 +107,6 @@ pub struct Shadow {
     pub gathers: bool,
     /// How its light source was chosen.
     pub guided: Guided,
-}
-
-/// What the radiosity solution says of a point of the far field.
-#[derive(Clone, Copy, Debug)]
-pub struct LookUp {
-    /// Reflected radiance, W/(sr m^2).
-    pub radiance: Vec3,
-    /// Whether direct light is not in it and is to be sampled at the point.
-    pub unlit: bool,
-    /// Whether rough reflection, which is in it as if it were diffuse, is to be followed instead.
-    pub rough: bool,
-    /// Probability with which what is not in it is worked out: the others are taken for diffuse.
-    pub probability: f32,
 }
 
 /// Where a path's ray met a surface of the scene.

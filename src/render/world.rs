@@ -6,12 +6,13 @@ use glam::Vec3;
 
 use super::cache::IrradianceCache;
 use super::caustics::Caustics;
+use super::look_up::{LookUp, most_specular, rough_probability};
 use super::nearness::Nearness;
-use super::path::{LookUp, Passes, Path};
+use super::path::{Passes, Path};
 use crate::backend::{Hit, RayScene};
 use crate::lighting::Lights;
 use crate::radiosity::Solution;
-use crate::scene::Scene;
+use crate::scene::{Material, Scene};
 use crate::shading::{Lobes, SurfacePoint};
 use crate::simplify::{Simplified, SimplifiedGeometry};
 
@@ -83,12 +84,18 @@ impl FarField<'_> {
         self.solution.radiosity(hit.triangle, hit.u, hit.v, front) * FRAC_1_PI
     }
 
-    /// What is used of that: without direct light where the patch's mean says little of this very point, and without rough reflection of what is
-    /// `glossy` where there is a near field. PMM is the paper's.
-    pub fn look_up(&self, hit: &Hit, direction: Vec3, glossy: bool) -> LookUp {
+    /// What is used of that on a triangle of the scene: without direct light where the patch's mean says little of this very point, and without
+    /// rough reflection where there is a near field. PMM is the paper's.
+    pub fn look_up(&self, hit: &Hit, direction: Vec3, material: &Material) -> LookUp {
         let front = self.solution.is_front(hit.triangle, direction);
         let (radiosity, unlit) = self.solution.look_up(hit.triangle, hit.u, hit.v, front);
-        LookUp { radiance: radiosity * FRAC_1_PI, unlit, rough: self.r_thresh > 0.0 && glossy, probability: 1.0 }
+        let probability = if unlit || self.plain[hit.triangle as usize] {
+            1.0
+        } else {
+            rough_probability(most_specular(material, self.solution.cosine(hit.triangle, direction)))
+        };
+        let rough = self.r_thresh > 0.0 && !material.is_lambertian();
+        LookUp { radiance: radiosity * FRAC_1_PI, unlit, rough, probability }
     }
 }
 
