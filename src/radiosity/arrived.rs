@@ -1,34 +1,36 @@
 //! Light that has arrived at the sides of patches, and where on them.
 
-use glam::{DVec3, Vec2};
+use glam::{DVec3, Vec2, Vec3};
 
 use super::patches::inset;
 use super::slope::Moments;
-use crate::backend::Hit;
+use crate::backend::{Hit, Ray};
 use crate::sampling;
 use crate::shading::SurfacePoint;
 
 /// Fewest and most points kept of a side.
 const KEPT: [usize; 2] = [16, 256];
 
-/// A point of a side.
+/// A point of a side, and from where light arrived there.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Place {
     /// Triangle of the geometry.
     pub triangle: u32,
     /// Barycentrics.
-    pub uv: [f32; 2],
+    pub uv: Vec2,
+    /// Unit vector towards where the light came from.
+    pub from: Vec3,
 }
 
 impl Place {
-    /// Where `point` lies.
-    pub fn of(point: &SurfacePoint) -> Place {
-        Place { triangle: point.triangle, uv: [point.u, point.v] }
+    /// `point`, lit from a direction.
+    pub fn lit(point: &SurfacePoint, from: Vec3) -> Place {
+        Place { triangle: point.triangle, uv: Vec2::new(point.u, point.v), from }
     }
 
     /// Where a ray arrived, drawn a little from the edges of the triangle.
-    pub fn met(hit: &Hit) -> Place {
-        Place { triangle: hit.triangle, uv: [inset(hit.u), inset(hit.v)] }
+    pub fn met(ray: &Ray, hit: &Hit) -> Place {
+        Place { triangle: hit.triangle, uv: Vec2::new(inset(hit.u), inset(hit.v)), from: -ray.direction }
     }
 }
 
@@ -156,7 +158,7 @@ mod tests {
                 for &triangle in &order {
                     let flux = [1.0, 2.0, 4.0][triangle as usize];
                     let random = sampling::unit(sampling::hash_all(&[run, triangle]));
-                    places.offer(Place { triangle, uv: [0.0; 2] }, flux, random);
+                    places.offer(Place { triangle, ..Place::default() }, flux, random);
                 }
                 let mut of_run = [0.0; 3];
                 for k in 0..KEPT[0] {

@@ -154,7 +154,7 @@ fn estimate(input: &RadiosityScene<'_>, patches: &Patches, counts: &[u32], place
                 let random = sampling::unit(sampling::hash_all(&[stream, side, estimate.rays as u32]));
                 let flux = patches.open_area(side) / f64::from(counts[k]) * irradiance.element_sum();
                 estimate.places.get_or_insert_with(|| Places::new(counts[k] as usize)).offer(place, flux, random);
-                estimate.moments.add(flux, patches.map.locate(place.triangle, place.uv[0], place.uv[1]).1);
+                estimate.moments.add(flux, patches.map.locate(place.triangle, place.uv.x, place.uv.y).1);
             }
             squares[k] += irradiance.element_sum().powi(2);
         }

@@ -51,6 +51,8 @@ pub(super) struct Tally {
     pub escaped: DVec3,
     /// Left a patch again in a specular direction: counted as incident there, but neither absorbed nor reflected diffusely.
     pub passed_on: DVec3,
+    /// Counts as shot but was absorbed, more than the mean reflectance of patches says; negative where it was less.
+    pub kept: DVec3,
     /// Given up after too many specular reflections; counts as absorbed.
     pub lost: DVec3,
     /// Rays traced.
@@ -62,6 +64,7 @@ impl Tally {
     pub fn add(&mut self, other: &Tally) {
         self.escaped += other.escaped;
         self.passed_on += other.passed_on;
+        self.kept += other.kept;
         self.lost += other.lost;
         self.rays += other.rays;
     }

@@ -214,8 +214,8 @@ struct Average {
     sums: [Vec<DVec3>; 2],
     /// Incident flux of each side straight from light sources, where it is uneven.
     uneven: Vec<Option<DVec3>>,
-    /// Where the light arrived that is looked up, as `sums`; empty where it is not known.
-    moments: [Vec<Moments>; 2],
+    /// Where the light of both halves arrived that is looked up, with the same weight; empty where it is not known.
+    moments: Vec<Moments>,
     weight: f64,
     ledger: Ledger,
     rays: u64,
@@ -228,7 +228,7 @@ impl Average {
         Average {
             sums: [vec![DVec3::ZERO; sides], vec![DVec3::ZERO; sides]],
             uneven: vec![None; sides],
-            moments: [Vec::new(), Vec::new()],
+            moments: Vec::new(),
             weight: 0.0,
             ledger: Ledger::default(),
             rays: 0,
@@ -331,11 +331,11 @@ impl Average {
             for (sum, flux) in self.sums[half].iter_mut().zip(run.incident(params.ambient)) {
                 *sum += weight * flux;
             }
-            self.moments[half].resize(run.moments().len(), Moments::default());
+            self.moments.resize(run.moments().len(), Moments::default());
             // What is looked up of an uneven side is reflected light alone.
             for (side, moments) in run.moments().iter().enumerate() {
                 let direct = gathered.filter(|_| self.uneven[side].is_some()).map(|g| g.at[half].moments[side]);
-                self.moments[half][side].add_rest(weight, *moments, direct.unwrap_or_default());
+                self.moments[side].add_rest(weight, *moments, direct.unwrap_or_default());
             }
             self.ledger.add(&run.ledger(), 0.5 * weight);
             self.rays += run.rays();
@@ -377,7 +377,7 @@ impl Average {
                 solution
             })
             .collect();
-        let found = slope::find(geometry, &patches, &self.moments);
+        let found = slope::find(geometry, &patches, &self.moments, |side| self.uneven[side as usize].is_some());
         log::debug!("light slopes on {} of {} sides", found.len(), 2 * patches.len());
         let mut slopes = Vec::with_capacity(found.len());
         for (number, (side, slope)) in (0..).zip(found) {

@@ -1,6 +1,6 @@
 //! What patches reflect and emit.
 
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::RadiosityScene;
@@ -128,10 +128,8 @@ fn mean(input: &RadiosityScene<'_>, patches: &Patches, patch: u32) -> Mean {
         let (on, uv) = patches.sample(patch, [s[0], s[1]]);
         let TriangleSource::Scene { triangle } = input.geometry.sources[on as usize] else { continue };
         let point = SurfacePoint::new(scene, &Hit { t: 0.0, u: uv.x, v: uv.y, triangle });
-        // Directions like those of the reflected light that is wanted. The back reflects like the front.
-        let toward = sampling::basis(point.shading_normal) * sampling::cosine_hemisphere(Vec2::new(s[2], s[3]));
-        let bsdf = Bsdf::new(scene, &point, toward, Lobes::MIRRORS);
-        reflectance += bsdf.albedo_low().as_dvec3();
+        let bsdf = Bsdf::new(scene, &point, point.shading_normal, Lobes::MIRRORS);
+        reflectance += bsdf.mean_albedo_low().as_dvec3();
         specular |= bsdf.albedo_high() != Vec3::ZERO;
         if look.is_emitter() {
             radiance += scene.emission(triangle, uv.x, uv.y).as_dvec3();

@@ -127,7 +127,7 @@ impl<'a> Run<'a> {
 
     /// Energy balance.
     pub fn ledger(&self) -> Ledger {
-        let (mut absorbed, mut unshot) = (self.tally.lost - self.tally.passed_on, DVec3::ZERO);
+        let (mut absorbed, mut unshot) = (self.tally.lost + self.tally.kept - self.tally.passed_on, DVec3::ZERO);
         for (side, incident) in self.arrived.flux.iter().enumerate() {
             absorbed += (1.0 - self.reflectance(side)) * incident;
             unshot += self.unshot(side);
@@ -267,9 +267,8 @@ impl<'a> Run<'a> {
         }
         let mut unshot = Unshot::default();
         self.survey(&mut unshot);
-        let mut lost = self.tally.escaped - self.tally_direct.escaped + self.tally.lost
-            - self.tally_direct.lost
-            - (self.tally.passed_on - self.tally_direct.passed_on);
+        let lost = |tally: &Tally| tally.escaped + tally.lost + tally.kept - tally.passed_on;
+        let mut lost = lost(&self.tally) - lost(&self.tally_direct);
         for (side, (incident, direct)) in self.arrived.flux.iter().zip(&self.direct).enumerate() {
             lost += (1.0 - self.reflectance(side)) * (incident - direct);
         }

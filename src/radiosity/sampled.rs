@@ -81,7 +81,7 @@ impl Sampled {
             }
             rays.push(ShadowRay::towards(light, point));
             let irradiance = f64::from(cos) * light.weight.as_dvec3();
-            arriving.push(Arriving { draw, side, place: Place::of(point), irradiance });
+            arriving.push(Arriving { draw, side, place: Place::lit(point, light.direction), irradiance });
         }
         through.clear();
         through.resize(rays.len(), Vec3::ONE);

@@ -36,7 +36,7 @@ pub(super) struct Shot {
     pub flux: DVec3,
     /// Stream of low-discrepancy points.
     pub stream: u32,
-    /// Where the light leaves from: where it arrived. `None`: from everywhere alike.
+    /// Where the light leaves from, and how: where it arrived and as it is reflected there. `None`: from everywhere and to everywhere alike.
     pub from: Option<Places>,
 }
 
@@ -87,6 +87,8 @@ pub(super) struct Photons {
     pub rays: Vec<Ray>,
     /// Loads.
     pub loads: Vec<Load>,
+    /// Flux that did not set out though the mean reflectance of its patch says so, W; negative where more did.
+    kept: DVec3,
 }
 
 impl Photons {
@@ -99,6 +101,7 @@ impl Photons {
     fn clear(&mut self) {
         self.rays.clear();
         self.loads.clear();
+        self.kept = DVec3::ZERO;
     }
 }
 
@@ -148,7 +151,6 @@ impl Tracer<'_> {
             total += u64::from(shot.rays);
             ends.push(total);
         }
-        let geometry = self.input.geometry;
         let emit = |range: Range<u64>, photons: &mut Photons| {
             let mut at = ends.partition_point(|&end| end <= range.start);
             for k in range {
@@ -157,18 +159,42 @@ impl Tracer<'_> {
                 }
                 let shot = &shots[at];
                 let index = u64::from(shot.rays) - (ends[at] - k);
-                let s = sampling::sobol(index as u32, 0, shot.stream);
-                let point = match &shot.from {
-                    Some(places) => self.patches.point_at(geometry, places.choose(s[0])),
-                    None => self.patches.open_point(geometry, shot.side, [s[0], s[1]]),
-                };
-                let local = sampling::cosine_hemisphere(Vec2::new(s[2], s[3]));
-                let direction = sampling::basis(side_normal(&point, shot.side)) * local;
                 let id = u64::from(shot.stream) << 32 | index;
-                photons.push(Ray::new(point.ray_origin(direction), direction), Load::new(shot.flux, id));
+                let leaving = self.leaving(shot, sampling::sobol(index as u32, 0, shot.stream));
+                if let Some((ray, flux)) = leaving {
+                    photons.push(ray, Load::new(flux, id));
+                }
+                photons.kept += shot.flux - leaving.map_or(DVec3::ZERO, |(_, flux)| flux);
             }
         };
         self.trace(total, &emit, Deposit::All, arrived)
+    }
+
+    /// A ray of a shot and its flux, W. Where light is not reflected alike into all directions, the flux differs from ray to ray: what arrives
+    /// along the surface, a coat reflects more of.
+    fn leaving(&self, shot: &Shot, s: [f32; 4]) -> Option<(Ray, DVec3)> {
+        let geometry = self.input.geometry;
+        let place = shot.from.as_ref().map(|places| places.choose(s[0]));
+        let point = match place {
+            Some(place) => self.patches.point_at(geometry, place.triangle, place.uv),
+            None => self.patches.open_point(geometry, shot.side, [s[0], s[1]]),
+        };
+        if let Some(place) = place
+            && let TriangleSource::Scene { triangle } = geometry.sources[place.triangle as usize]
+            && !self.input.scene.material(triangle).is_lambertian()
+        {
+            // Reflection is reciprocal.
+            let on_scene = SurfacePoint { triangle, ..point };
+            let bsdf = Bsdf::new(self.input.scene, &on_scene, place.from, Lobes::MIRRORS);
+            let sample = bsdf.sample_low([s[1], s[2], s[3]])?;
+            let mean = self.optics.reflectance[shot.side as usize / 2];
+            let weight = Vec3::select(mean.cmpgt(Vec3::ZERO), sample.weight / mean, Vec3::ZERO);
+            let ray = Ray::new(point.ray_origin(sample.direction), sample.direction);
+            return Some((ray, shot.flux * weight.as_dvec3()));
+        }
+        let local = sampling::cosine_hemisphere(Vec2::new(s[2], s[3]));
+        let direction = sampling::basis(side_normal(&point, shot.side)) * local;
+        Some((Ray::new(point.ray_origin(direction), direction), shot.flux))
     }
 
     /// Traces the photons `0..count`, which `emit` makes, and adds what arrives to `arrived`. The result does not depend on the
@@ -203,7 +229,8 @@ impl Tracer<'_> {
 
     fn follow(&self, scratch: &mut Scratch, deposit: Deposit) -> Output {
         let Scratch { photons, next, hits } = scratch;
-        let mut output = Output { landings: Vec::with_capacity(photons.rays.len()), tally: Tally::default() };
+        let tally = Tally { kept: photons.kept, ..Tally::default() };
+        let mut output = Output { landings: Vec::with_capacity(photons.rays.len()), tally };
         for depth in 0..MAX_CHAIN {
             if photons.rays.is_empty() {
                 return output;
@@ -229,7 +256,7 @@ impl Tracer<'_> {
                 if counts {
                     let front = ray.direction.dot(self.patches.planes[hit.triangle as usize].normal) < 0.0;
                     let side = 2 * patch + u32::from(!front);
-                    output.landings.push(Landing { side, flux: load.flux, place: Place::met(hit), local });
+                    output.landings.push(Landing { side, flux: load.flux, place: Place::met(ray, hit), local });
                 }
                 if self.optics.specular[patch as usize]
                     && let Some((ray, load)) = self.pass_on(patch, hit, ray.direction, load, depth as u32)

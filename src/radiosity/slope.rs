@@ -1,33 +1,31 @@
 //! How light changes over a side of a patch, to first order.
 //!
 //! A radiosity is a mean over a side. Who looks at the slats of a blind from inside the room sees their inner edges, which get less light than
-//! the outer ones; who looks under a table sees the floor's darker part. Where light arrived is known: its centroid against that of the area
-//! gives the best linear fit, `B(l) = B (1 + g (l - m))` with `g = C^-1 (c - m)`, where `l` are coordinates in the patch's cell, `m` and `C` their
-//! mean and covariance over the open part of the side, and `c` the centroid of the light. The fit's relative variance over the side is
-//! `(c - m) C^-1 (c - m)`.
+//! the outer ones; who looks under a table sees the floor's darker part. Where light arrived is known: its centroid `c` against that of the area,
+//! `m`, gives the best linear fit `B(l) = B (1 + g (l - m))` with `g = C^-1 (c - m)`, where `l` are coordinates in the patch's cell and `C` their
+//! covariance over the open part of the side. The fit's relative variance over the side is `g C g`.
 //!
-//! A side has a slope where that is more than what chance makes of the rays that brought the light. Slopes of chance would have no bias, but make
-//! what single gather rays bring noisier.
+//! A centroid of `n` equal rays has the covariance `C / n`, so that few rays make a slope by chance. Two things keep that small. A side
+//! shares the slopes of the sides around it, weighted by how well these are known and how much they may differ from its own: `g` solves
+//! `(sum w C) g = sum w (c - m)`. And a slope that could be chance is shrunk by the factor `1 - CHANCE / z` (the nonnegative garrote: Breiman
+//! 1995), where `z = g (sum w C) g` of even light follows the chi-square distribution with two degrees of freedom.
 
 use glam::{DMat2, DVec2, DVec3, Vec2};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::patches::Patches;
-use crate::sampling;
+use super::patches::{MIDDLE, Patches};
 use crate::simplify::SimplifiedGeometry;
 
 /// Least relative standard deviation of the fit over a side: less is nothing to the errors of single patches.
 const LEAST: f64 = 0.1;
-/// The fit's relative variance is at least this multiple of what chance makes of even light, for each of its two dimensions: that makes a slope of one
-/// side in a hundred (chi-square).
-const CERTAIN: f64 = 9.2;
-/// Points that stand for the open part of a side.
-const POINTS: u32 = 64;
+/// What a slope loses for what chance may have made of it. Even light would make 2 in the mean, one for each dimension; half of that errs less where there
+/// is a slope, and hardly adds noise where there is none.
+const CHANCE: f64 = 1.0;
+/// Relative variance over a side by which slopes of neighbours usually differ.
+const DIFFERENCE: f64 = 0.01;
 /// Added to the covariance of cell coordinates, whose variance over a full cell is 1/12: slivers have no second direction.
 const LEAST_VARIANCE: f64 = 1e-3;
-/// Centre of a cell.
-const MIDDLE: DVec2 = DVec2::splat(0.5);
 
 /// Flux, all bands together, and its first moments in cell coordinates about the middle of the cell, W.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -72,49 +70,59 @@ impl Slope {
     pub fn at(&self, local: Vec2) -> f32 {
         (1.0 + self.change.dot(local - self.mean)).max(0.0)
     }
-
-    /// The fit to both halves' `moments`, where it is certain and worth it.
-    fn fit(geometry: &SimplifiedGeometry, patches: &Patches, side: u32, moments: [Moments; 2]) -> Option<Slope> {
-        let [Some((a, per_a)), Some((b, per_b))] = moments.map(Moments::centroid) else { return None };
-        // Of a cell that is full and open. Most sides end here.
-        if 12.0 * a.dot(b) < LEAST * LEAST {
-            return None;
-        }
-        let points: Vec<DVec2> = (0..POINTS)
-            .map(|i| {
-                let [u, v, ..] = sampling::sobol(i, 0, side);
-                let point = patches.open_point(geometry, side, [u, v]);
-                patches.map.locate(point.triangle, point.u, point.v).1.as_dvec2() - MIDDLE
-            })
-            .collect();
-        let per_point = 1.0 / f64::from(POINTS);
-        let mean = points.iter().sum::<DVec2>() * per_point;
-        let square = |d: DVec2| DMat2::from_cols(d * d.x, d * d.y);
-        let covariance = points
-            .iter()
-            .fold(DMat2::from_diagonal(DVec2::splat(LEAST_VARIANCE)), |sum, &p| sum + square(p - mean) * per_point);
-        let inverse = covariance.inverse();
-        let centroid = 0.5 * (a + b) - mean;
-        let variance = centroid.dot(inverse * centroid);
-        if variance < (CERTAIN * 0.25 * (per_a + per_b)).max(LEAST * LEAST) {
-            return None;
-        }
-        let change = inverse * centroid;
-        // No negative light: as steep as that allows, so that the mean stays what it is.
-        let lowest = points.iter().map(|&p| change.dot(p - mean)).fold(0.0, f64::min);
-        let change = change * (-1.0 / lowest).clamp(0.0, 1.0);
-        Some(Slope { mean: (mean + MIDDLE).as_vec2(), change: change.as_vec2() })
-    }
 }
 
-/// The slopes of those sides that have one, in ascending order, from the moments of both halves. Equivalent boxes are looked up as they are.
-pub(super) fn find(geometry: &SimplifiedGeometry, patches: &Patches, moments: &[Vec<Moments>; 2]) -> Vec<(u32, Slope)> {
-    let [a, b] = moments;
-    let fit = |(side, (&a, &b)): (usize, (&Moments, &Moments))| {
-        if patches.box_cell[side / 2].is_some() {
+/// What is known of a side by itself.
+#[derive(Clone, Copy)]
+struct Known {
+    /// Mean of its open part about the middle of the cell.
+    mean: DVec2,
+    /// Centroid of light less that mean.
+    shift: DVec2,
+    covariance: DMat2,
+    /// Relative variance over the side of a slope that chance makes, in each dimension.
+    chance: f64,
+}
+
+/// The slopes of those sides that have one, in ascending order. Equivalent boxes are looked up as they are. What is looked up of an `uneven` side
+/// is of another kind than of its neighbours.
+pub(super) fn find(
+    geometry: &SimplifiedGeometry,
+    patches: &Patches,
+    moments: &[Moments],
+    uneven: impl Fn(u32) -> bool + Sync,
+) -> Vec<(u32, Slope)> {
+    let known = |side: u32| {
+        if patches.box_cell[side as usize / 2].is_some() {
             return None;
         }
-        Some((side as u32, Slope::fit(geometry, patches, side as u32, [a, b])?))
+        let (centroid, chance) = moments[side as usize].centroid()?;
+        let shape = patches.open_shape(geometry, side);
+        let covariance = shape.covariance + DMat2::from_diagonal(DVec2::splat(LEAST_VARIANCE));
+        Some(Known { mean: shape.mean, shift: centroid - shape.mean, covariance, chance })
     };
-    a.par_iter().zip(b).enumerate().filter_map(fit).collect()
+    let sides = 0..moments.len() as u32;
+    let known: Vec<Option<Known>> = sides.clone().into_par_iter().map(known).collect();
+    let slope = |side: u32| {
+        let own = known[side as usize]?;
+        let (mut precision, mut shift) = (own.covariance * (1.0 / own.chance), own.shift / own.chance);
+        for other in patches.beside(side / 2).map(|patch| 2 * patch + side % 2) {
+            if let Some(known) = known[other as usize].filter(|_| uneven(other) == uneven(side)) {
+                let weight = 1.0 / (known.chance + DIFFERENCE);
+                precision += known.covariance * weight;
+                shift += known.shift * weight;
+            }
+        }
+        let change = precision.inverse() * shift;
+        let kept = 1.0 - CHANCE / change.dot(shift);
+        let change = change * kept.max(0.0);
+        if change.dot(own.covariance * change) < LEAST * LEAST {
+            return None;
+        }
+        // No negative light: as steep as that allows, so that the mean stays what it is.
+        let lowest = patches.corners_in_cells(side / 2).map(|p| change.dot(p - own.mean)).fold(0.0, f64::min);
+        let change = change * (-1.0 / lowest).clamp(0.0, 1.0);
+        Some((side, Slope { mean: (own.mean + MIDDLE).as_vec2(), change: change.as_vec2() }))
+    };
+    sides.into_par_iter().filter_map(slope).collect()
 }

@@ -74,6 +74,11 @@ impl Exposure {
         exposure
     }
 
+    /// Whether all of a side lies open.
+    pub fn is_all_open(&self, side: u32) -> bool {
+        self.open[side as usize] == ALL
+    }
+
     /// Share of a side that lies open, above 0.
     pub fn share(&self, side: u32) -> f64 {
         f64::from(self.open[side as usize].count_ones()) / f64::from(PARTS * PARTS)

@@ -9,6 +9,7 @@ mod grid;
 mod join;
 pub(super) mod neighbours;
 mod sampling;
+mod shape;
 
 use std::collections::VecDeque;
 
@@ -25,6 +26,8 @@ use charts::{Charts, Frame};
 use exposure::Exposure;
 use grid::Grid;
 pub(super) use sampling::inset;
+use shape::Cell;
+pub(super) use shape::MIDDLE;
 
 const NONE: u32 = u32::MAX;
 
@@ -54,6 +57,7 @@ pub(super) struct Patches {
     pub diameter: Vec<f32>,
     /// Plane of each triangle.
     pub planes: Vec<Plane>,
+    cells: Vec<Cell>,
     /// Where on its equivalent box a patch lies.
     pub box_cell: Vec<Option<BoxCell>>,
     /// Edge length that was used: the one asked for, or larger.
@@ -149,6 +153,7 @@ impl Patches {
             exposure: Exposure::everything(0),
             diameter: Vec::new(),
             planes,
+            cells: Vec::new(),
             box_cell: Vec::new(),
             size,
         };
@@ -199,6 +204,7 @@ impl Patches {
             self.first_piece.push(self.pieces.len() as u32);
             self.area.push(area);
             self.diameter.push(grid.cell_diameter() as f32);
+            self.cells.push(Cell { first: first_cell, across: grid.cells, index: cell });
             self.box_cell.push(match geometry.sources[triangles[0] as usize] {
                 TriangleSource::BoxFace { cluster, face, .. } => Some(BoxCell { cluster, face, index: cell }),
                 TriangleSource::Scene { .. } => None,
@@ -240,11 +246,15 @@ impl PatchMap {
         self.locate(triangle, u, v).0
     }
 
+    fn grid_coordinates(&self, triangle: u32, uv: Vec2) -> Vec2 {
+        self.maps[triangle as usize].grid_coordinates(uv)
+    }
+
     /// The same, with the coordinates in the grid's cell, 0..=1.
     #[inline]
     pub fn locate(&self, triangle: u32, u: f32, v: f32) -> (u32, Vec2) {
         let map = &self.maps[triangle as usize];
-        let at = map.origin + u * map.du + v * map.dv;
+        let at = map.grid_coordinates(Vec2::new(u, v));
         // A cast from float saturates: below zero becomes 0.
         let x = (at.x as u32).min(u32::from(map.cells[0]) - 1);
         let y = (at.y as u32).min(u32::from(map.cells[1]) - 1);
@@ -260,6 +270,11 @@ impl Default for CellMap {
 }
 
 impl CellMap {
+    /// Coordinates in the grid, one cell = 1.
+    fn grid_coordinates(&self, uv: Vec2) -> Vec2 {
+        self.origin + uv.x * self.du + uv.y * self.dv
+    }
+
     fn new(geometry: &SimplifiedGeometry, grid: &Grid, triangle: u32, first: u32) -> CellMap {
         let [a, b, c] = corners(geometry, geometry.triangles[triangle as usize]).map(|p| grid.coordinates(p));
         let [nx, ny] = grid.cells;

@@ -3,7 +3,6 @@
 use glam::Vec2;
 
 use super::{Patches, Piece};
-use crate::radiosity::arrived::Place;
 use crate::shading::SurfacePoint;
 use crate::simplify::SimplifiedGeometry;
 
@@ -38,12 +37,12 @@ impl Patches {
     /// [`Patches::sample`] as a point that rays can start from.
     pub fn point(&self, geometry: &SimplifiedGeometry, patch: u32, s: [f32; 2]) -> SurfacePoint {
         let (triangle, uv) = self.sample(patch, s);
-        self.point_at(geometry, Place { triangle, uv: uv.to_array() })
+        self.point_at(geometry, triangle, uv)
     }
 
-    /// A place as a point that rays can start from.
-    pub fn point_at(&self, geometry: &SimplifiedGeometry, Place { triangle, uv: [u, v] }: Place) -> SurfacePoint {
+    /// Barycentrics of a triangle as a point that rays can start from.
+    pub fn point_at(&self, geometry: &SimplifiedGeometry, triangle: u32, uv: Vec2) -> SurfacePoint {
         let corners = geometry.triangles[triangle as usize].map(|i| geometry.positions[i as usize]);
-        SurfacePoint::on_plane(corners, &self.planes[triangle as usize], triangle, u, v)
+        SurfacePoint::on_plane(corners, &self.planes[triangle as usize], triangle, uv.x, uv.y)
     }
 }

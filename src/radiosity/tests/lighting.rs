@@ -2,10 +2,12 @@
 
 use std::f32::consts::PI;
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 
 use super::*;
+use crate::backend::Hit;
 use crate::scene::LightKind;
+use crate::shading::{Bsdf, Lobes, SurfacePoint};
 
 fn light(intensity: f32, kind: LightKind) -> PunctualLight {
     PunctualLight { name: "light".to_owned(), intensity: Vec3::splat(intensity), kind }
@@ -143,5 +145,73 @@ fn same_result_with_any_number_of_threads() {
         };
         let one = run(1);
         assert!(one == run(2) && one == run(5));
+    }
+}
+
+/// A lamp shines along a floor that is metal or under a coat, and at nothing else: of its light, as much arrives at the wall behind as an integral
+/// over floor and directions says, and much more than even reflection would bring.
+#[test]
+fn rough_reflection_leaves_in_its_direction() {
+    let p = Vec3::new;
+    let square = [p(-0.5, -0.5, 0.), p(0.5, -0.5, 0.), p(0.5, 0.5, 0.), p(-0.5, 0.5, 0.)];
+    let wall = [p(2., -2., 0.), p(2., -2., 2.), p(2., 2., 2.), p(2., 2., 0.)];
+    let meets_wall = |from: Vec3, direction: Vec3| {
+        let at = from + direction * ((2.0 - from.x) / direction.x);
+        direction.x > 0.0 && at.y.abs() < 2.0 && (0.0..2.0).contains(&at.z)
+    };
+    let position = p(-3.0, 0.0, 0.6);
+    // Hides the wall, and nothing of the floor.
+    let plate = [p(-1., -4., 0.3), p(-1., -4., 2.), p(-1., 4., 2.), p(-1., 4., 0.3)];
+    let coat = Material { base_color: Vec3::splat(0.5), metallic: 0.0, ..Material::default() };
+    for (floor, above) in [
+        (Material { base_color: p(0.9, 0.6, 0.3), roughness: 0.4, ..Material::default() }, 4.0),
+        (Material { roughness: 0.3, ..coat.clone() }, 1.5),
+    ] {
+        // The others reflect a hundredth, of which the floor returns less than a thousandth part of what is measured.
+        let surfaces = vec![
+            (diced(square, 1), floor),
+            (diced(wall, 1), material(0.01, 0.0)),
+            (diced(plate, 1), material(0.01, 0.0)),
+        ];
+        let room = Room::new(surfaces, vec![light(1.0, LightKind::Point { position })]);
+        let (mut exact, mut even) = (DVec3::ZERO, 0.0);
+        let points = 1 << 17;
+        for i in 0..points {
+            let ([u, v, a, b], [c, which, ..]) = (sampling::sobol(i, 0, 1), sampling::sobol(i, 1, 1));
+            let corner = u + v > 1.0;
+            let hit = Hit {
+                t: 0.0,
+                u: if corner { 1.0 - u } else { u },
+                v: if corner { 1.0 - v } else { v },
+                triangle: u32::from(which < 0.5),
+            };
+            let point = SurfacePoint::new(&room.scene, &hit);
+            let to_lamp = position - point.position;
+            let irradiance = f64::from(to_lamp.normalize().z / to_lamp.length_squared());
+            let bsdf = Bsdf::new(&room.scene, &point, to_lamp.normalize(), Lobes::MIRRORS);
+            let sample = bsdf.sample_low([c, a, b]).filter(|s| meets_wall(point.position, s.direction));
+            exact += irradiance * sample.map_or(Vec3::ZERO, |s| s.weight).as_dvec3();
+            let evenly = sampling::cosine_hemisphere(Vec2::new(a, b));
+            even +=
+                if meets_wall(point.position, evenly) { irradiance * f64::from(bsdf.mean_albedo_low().x) } else { 0.0 };
+        }
+        let (exact, even) = (exact / f64::from(points), even / f64::from(points));
+        let seeds = 16;
+        let (mut sum, mut squares) = (DVec3::ZERO, DVec3::ZERO);
+        for seed in 0..seeds {
+            // Most light goes to the plate, hence the low limit of what may stay unshot.
+            let params = RadiosityParams { unshot: 1e-6, error: 0.02, seed, ..RadiosityParams::new(10.0) };
+            let (area, radiosity) = room.surface(&room.solve(&params).unwrap(), 1);
+            let arrived = area * radiosity / 0.01;
+            sum += arrived;
+            squares += arrived * arrived;
+        }
+        let n = f64::from(seeds);
+        let mean = sum / n;
+        let error = ((squares / n - mean * mean) / (n - 1.0)).max(DVec3::ZERO).map(f64::sqrt);
+        println!("{mean} +- {error}, exact {exact}, even reflection {even}");
+        // Three tests of each floor at four standard errors: 4e-4 in all, and the integral's own error.
+        assert!((mean - exact).abs().cmple(4.0 * error + 0.003 * exact).all(), "{mean} +- {error} {exact}");
+        assert!(error.cmplt(0.02 * exact).all() && exact.x > above * even, "{error} {exact} {even}");
     }
 }
