@@ -3,11 +3,13 @@
 //! Indirect light changes little from pixel to pixel, but some of it arrives on paths that hardly any trial finds: a sunlit sill in a dull
 //! reflection, the reflection of a lamp in a vase. A pixel that happens to have such a trial is a bright speck, and those around it are a
 //! little too dark. The brightest trials of each pixel are therefore kept apart, and what makes them stand out of the noise is
-//! given to all pixels of the block, in proportion to the indirect light that they have without it and most to those that are
-//! as bright as the one it came from. Nothing is lost: the block's sum stays what it was, as does its expected value, but this part
-//! of it is as blurred as a block is wide. (Zirr, Hanika, Dachsbacher 2018 tell such trials apart in the same way but weaken them.)
+//! given to the pixels of the block around, in proportion to the indirect light that they have without it and most to those that are
+//! as bright as the one it came from, no further than it takes to hide it. Nothing is lost: the block's sum stays what it was, as does its expected
+//! value, but this part of it is blurred. (Zirr, Hanika, Dachsbacher 2018 tell such trials apart in the same way but weaken them.)
 
-use glam::Vec3;
+use std::f64::consts::TAU;
+
+use glam::{IVec2, UVec2, Vec3};
 use serde::{Deserialize, Serialize};
 
 use super::film::{Pixel, PixelSum, Tile};
@@ -20,6 +22,12 @@ const SEEN: f64 = 0.05;
 
 /// A trial so many times as bright as indirect light around is rare: a trial of any usual kind is not.
 const RARE: f64 = 4.0;
+
+/// Standard deviation in pixels of the distances to which light is given: at least this, ...
+const REACH: f64 = 3.0;
+
+/// ... and so much that no pixel gets more than this part of what one trial may add.
+const PART: f64 = 0.25;
 
 /// The brightest trials of one pixel in LORES, the brightest first.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
@@ -48,6 +56,8 @@ struct Judge {
     usual: Vec<f64>,
     /// Radiance that a trial must not stand out of.
     radiance: Vec<f64>,
+    /// Where the pixels are.
+    at: Vec<IVec2>,
 }
 
 impl Judge {
@@ -73,15 +83,17 @@ impl Judge {
             })
             .collect();
         let radiance = tile.pixels.iter().zip(&usual).map(|(pixel, usual)| of(&pixel.hires) + usual).collect();
-        Judge { usual, radiance }
+        let at = (0..tile.pixels.len() as u32).map(|i| UVec2::from_array(tile.pixel(i)).as_ivec2()).collect();
+        Judge { usual, radiance, at }
     }
 
     /// Of several tiles, one after the other.
     fn of_all(tiles: &[&mut Tile]) -> Self {
-        let mut all = Judge { usual: Vec::new(), radiance: Vec::new() };
+        let mut all = Judge { usual: Vec::new(), radiance: Vec::new(), at: Vec::new() };
         for mut judge in tiles.iter().map(|tile| Judge::new(tile)) {
             all.usual.append(&mut judge.usual);
             all.radiance.append(&mut judge.radiance);
+            all.at.append(&mut judge.at);
         }
         all
     }
@@ -91,14 +103,18 @@ impl Judge {
         (SEEN * f64::from(trials) * self.radiance[i]).max(RARE * self.usual[i])
     }
 
-    /// Shares of the pixels in what pixel `i` gives away.
-    fn shares(&self, i: usize) -> Vec<f64> {
+    /// Shares of the pixels in what pixel `i` gives away, `given` in the mean over bands.
+    fn shares(&self, i: usize, given: f64) -> Vec<f64> {
         let here = self.usual[i];
+        // The largest share of a normal distribution is 1 / (2 pi variance).
+        let variance = (given / (TAU * PART * SEEN * self.radiance[i])).max(REACH * REACH);
         let alike = |there: f64| {
             let (low, high) = (here.min(there), here.max(there));
             if high > 0.0 { low / high } else { 1.0 }
         };
-        let weights: Vec<f64> = self.usual.iter().map(|&there| there * alike(there).powi(2)).collect();
+        let close = |at: IVec2| (-0.5 * f64::from((at - self.at[i]).length_squared()) / variance).exp();
+        let weight = |(&there, &at): (&f64, &IVec2)| there * alike(there).powi(2) * close(at);
+        let weights: Vec<f64> = self.usual.iter().zip(&self.at).map(weight).collect();
         let sum: f64 = weights.iter().sum();
         // Where nothing else is seen, it stays.
         let own = |j: usize| if i == j { 1.0 } else { 0.0 };
@@ -128,7 +144,7 @@ pub fn share(tiles: &mut [&mut Tile]) {
         if given.is_black() {
             continue;
         }
-        for (to, share) in shared.iter_mut().zip(judge.shares(i)) {
+        for (to, share) in shared.iter_mut().zip(judge.shares(i, given.all.iter().sum::<f64>() / 3.0)) {
             to.add_share(&given, share);
         }
     }
@@ -223,6 +239,20 @@ mod tests {
         for (before, after) in before.pixels.iter().zip(&after.pixels) {
             assert_eq!((before.lores.mean(), before.lores.variance()), (after.lores.mean(), after.lores.variance()));
         }
+    }
+
+    /// What is a little too bright is hidden among the nearest pixels, what is very bright needs all.
+    #[test]
+    fn it_goes_no_further_than_it_must() {
+        let far_over_near = |bright: f32| {
+            let before = tile(|_| 1.0, Vec3::splat(bright));
+            let mut after = before.clone();
+            share(&mut [&mut after]);
+            let more = |i: usize| after.pixels[i].lores.mean()[0] - before.pixels[i].lores.mean()[0];
+            more(0) / more(35)
+        };
+        let (little, much) = (far_over_near(8.0), far_over_near(8000.0));
+        assert!(little < 0.5 && much > 0.9, "{little} {much}");
     }
 
     /// A dark table in front of a bright wall: what a trial at the wall found stays on the wall, and black stays black.
