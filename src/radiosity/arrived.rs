@@ -89,7 +89,7 @@ impl Places {
 pub(super) struct Whereabouts {
     /// As places to shoot from.
     pub places: Vec<Option<Places>>,
-    /// As moments over the side.
+    /// As moments over the side, of the light that is looked up.
     pub moments: Vec<Moments>,
 }
 
@@ -105,7 +105,7 @@ impl Whereabouts {
 pub(super) struct Arrived {
     /// Flux, W.
     pub flux: Vec<DVec3>,
-    /// Where it arrived: as moments all of it, as places what arrived since the side last shot.
+    /// Where it arrived: as moments from the start on, as places what arrived since the side last shot.
     at: Whereabouts,
     /// Points wanted of a side.
     wanted: usize,

@@ -118,14 +118,18 @@ pub(super) fn gather(input: &RadiosityScene<'_>, patches: &Patches, places: bool
         (0..).zip(&pilot).filter(|(_, e)| places && e.differ(UNEVEN)).map(|(side, _)| side).collect();
     let (found, rays_for_uneven) = uneven(input, patches, &differing, UNEVEN, stream(4));
     log::debug!("direct light: uneven on {} of {} sides, samples differ on {}", found.len(), sides, differing.len());
-    let mut uneven = vec![None; sides];
+    let (mut uneven, mut at) = (vec![None; sides], [at_a, at_b]);
     for side in found.into_iter().map(|side| side as usize) {
         uneven[side] = Some(0.5 * (a[side] + b[side]));
+        // What is looked up there is reflected light alone.
+        for half in &mut at {
+            half.moments[side] = Moments::default();
+        }
     }
     Direct {
         uneven,
         incident: [a, b],
-        at: [at_a, at_b],
+        at,
         error: if flux > 0.0 { expected / flux } else { 0.0 },
         rays: rays + rays_for_uneven,
     }

@@ -332,10 +332,8 @@ impl Average {
                 *sum += weight * flux;
             }
             self.moments.resize(run.moments().len(), Moments::default());
-            // What is looked up of an uneven side is reflected light alone.
-            for (side, moments) in run.moments().iter().enumerate() {
-                let direct = gathered.filter(|_| self.uneven[side].is_some()).map(|g| g.at[half].moments[side]);
-                self.moments[side].add_rest(weight, *moments, direct.unwrap_or_default());
+            for (sum, moments) in self.moments.iter_mut().zip(run.moments()) {
+                sum.add_times(weight, *moments);
             }
             self.ledger.add(&run.ledger(), 0.5 * weight);
             self.rays += run.rays();

@@ -43,10 +43,10 @@ impl Moments {
         self.squares += flux * flux;
     }
 
-    /// Adds `weight` times what `all` has more than `part`.
-    pub fn add_rest(&mut self, weight: f64, all: Moments, part: Moments) {
-        self.sum += weight * (all.sum - part.sum);
-        self.squares += weight * weight * (all.squares - part.squares);
+    /// Adds `weight` times other light.
+    pub fn add_times(&mut self, weight: f64, other: Moments) {
+        self.sum += weight * other.sum;
+        self.squares += weight * weight * other.squares;
     }
 
     /// Centroid about the middle of the cell, and one over the number of equal rays that would make it as uncertain; `None` without light.
@@ -116,7 +116,9 @@ pub(super) fn find(
         let change = precision.inverse() * shift;
         let kept = 1.0 - CHANCE / change.dot(shift);
         let change = change * kept.max(0.0);
-        if change.dot(own.covariance * change) < LEAST * LEAST {
+        // False for what is not finite.
+        let counts = change.dot(own.covariance * change) >= LEAST * LEAST;
+        if !counts {
             return None;
         }
         // No negative light: as steep as that allows, so that the mean stays what it is.

@@ -77,7 +77,7 @@ impl Patches {
         piece.uv.map(|uv| (self.map.grid_coordinates(piece.triangle, uv) - at + local).as_dvec2() - MIDDLE)
     }
 
-    /// Patches in the cells around that of a patch, in the same chart.
+    /// Patches in the eight cells around that of a patch, in the same chart; what fills several of these, as often.
     pub fn beside(&self, patch: u32) -> impl Iterator<Item = u32> {
         let Cell { first, across: [nx, ny], index } = self.cells[patch as usize];
         let (x, y) = (index % nx, index / nx);

@@ -165,7 +165,7 @@ fn rough_reflection_leaves_in_its_direction() {
     let coat = Material { base_color: Vec3::splat(0.5), metallic: 0.0, ..Material::default() };
     for (floor, above) in [
         (Material { base_color: p(0.9, 0.6, 0.3), roughness: 0.4, ..Material::default() }, 4.0),
-        (Material { roughness: 0.3, ..coat.clone() }, 1.5),
+        (Material { roughness: 0.3, ..coat }, 1.5),
     ] {
         // The others reflect a hundredth, of which the floor returns less than a thousandth part of what is measured.
         let surfaces = vec![
