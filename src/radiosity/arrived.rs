@@ -1,8 +1,9 @@
 //! Light that has arrived at the sides of patches, and where on them.
 
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec2, DVec3, Vec2, Vec3};
 
 use super::patches::inset;
+use super::shoot::Coated;
 use super::slope::Moments;
 use crate::backend::{Hit, Ray};
 use crate::sampling;
@@ -107,6 +108,8 @@ pub(super) struct Arrived {
     pub flux: Vec<DVec3>,
     /// Where it arrived: as moments from the start on, as places what arrived since the side last shot.
     at: Whereabouts,
+    /// Sums of [`Coated::flux`], one a side; empty where places are not remembered.
+    coated: Vec<DVec2>,
     /// Points wanted of a side.
     wanted: usize,
     /// For random numbers.
@@ -117,7 +120,7 @@ pub(super) struct Arrived {
 impl Arrived {
     /// `flux` on each side, and where that arrived, `at`, if it is to be remembered: about `wanted` places for each side, from now on.
     pub fn new(flux: Vec<DVec3>, at: Whereabouts, wanted: usize, stream: u32) -> Self {
-        Arrived { flux, at, wanted, stream, count: 0 }
+        Arrived { coated: vec![DVec2::ZERO; at.places.len()], flux, at, wanted, stream, count: 0 }
     }
 
     /// Adds light.
@@ -129,6 +132,18 @@ impl Arrived {
             let random = sampling::unit(sampling::hash(self.stream ^ self.count));
             places.get_or_insert_with(|| Places::new(self.wanted)).offer(place, flux.element_sum(), random);
         }
+    }
+
+    /// Adds light that coated sides reflected.
+    pub fn note_coated(&mut self, coated: &[Coated]) {
+        for &Coated { side, flux } in coated {
+            self.coated[side as usize] += flux;
+        }
+    }
+
+    /// Sums of [`Coated::flux`], one a side; none where places are not remembered.
+    pub fn coated(&self) -> &[DVec2] {
+        &self.coated
     }
 
     /// Where light arrived, one entry a side; none where that is not remembered.

@@ -21,7 +21,7 @@ mod uneven;
 
 use std::f64::consts::FRAC_PI_2;
 
-use glam::{DVec3, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 
 use crate::backend::RayScene;
 use crate::error::{Error, Result};
@@ -216,6 +216,8 @@ struct Average {
     uneven: Vec<Option<DVec3>>,
     /// Where the light of both halves arrived that is looked up, with the same weight; empty where it is not known.
     moments: Vec<Moments>,
+    /// What coated sides reflected of it ([`shoot::Coated`]), with the same weight; empty where it is not known.
+    coated: Vec<DVec2>,
     weight: f64,
     ledger: Ledger,
     rays: u64,
@@ -229,6 +231,7 @@ impl Average {
             sums: [vec![DVec3::ZERO; sides], vec![DVec3::ZERO; sides]],
             uneven: vec![None; sides],
             moments: Vec::new(),
+            coated: Vec::new(),
             weight: 0.0,
             ledger: Ledger::default(),
             rays: 0,
@@ -335,6 +338,10 @@ impl Average {
             for (sum, moments) in self.moments.iter_mut().zip(run.moments()) {
                 sum.add_times(weight, *moments);
             }
+            self.coated.resize(run.coated().len(), DVec2::ZERO);
+            for (sum, coated) in self.coated.iter_mut().zip(run.coated()) {
+                *sum += weight * coated;
+            }
             self.ledger.add(&run.ledger(), 0.5 * weight);
             self.rays += run.rays();
             self.shots += run.shots;
@@ -355,6 +362,15 @@ impl Average {
         if sum > 0.0 { FRAC_PI_2.sqrt() * difference / sum } else { 0.0 }
     }
 
+    /// How much more of the light that arrived at a side is reflected diffusely than of light from everywhere. One where direct light is looked up
+    /// apart: the rest comes from everywhere, about.
+    fn over_mean(&self, side: usize) -> f64 {
+        match self.coated.get(side) {
+            Some(&DVec2 { x: all, y: diffuse }) if all > 0.0 && self.uneven[side].is_none() => diffuse / all,
+            _ => 1.0,
+        }
+    }
+
     fn into_solution(self, geometry: &SimplifiedGeometry, patches: Patches, optics: &Optics) -> Solution {
         let error = self.error(&patches, optics) as f32;
         let scale = if self.weight > 0.0 { 0.5 / self.weight } else { 0.0 };
@@ -366,7 +382,7 @@ impl Average {
                 for k in 0..2 {
                     let (a, b) = (self.sums[0][2 * patch + k], self.sums[1][2 * patch + k]);
                     let area = patches.open_area((2 * patch + k) as u32);
-                    let factor = optics.reflectance[patch].as_dvec3() * (scale / area);
+                    let factor = optics.reflectance[patch].as_dvec3() * (scale / area * self.over_mean(2 * patch + k));
                     solution.radiosity[k] = (factor * (a + b)).as_vec3();
                     let reflected = optics.reflectance[patch].as_dvec3() / area;
                     solution.uneven[k] = self.uneven[2 * patch + k].map(|flux| (reflected * flux).as_vec3());

@@ -1,6 +1,6 @@
 //! Progressive refinement: the sides with the largest unshot flux shoot first, until little is left.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::arrived::Arrived;
@@ -110,6 +110,11 @@ impl<'a> Run<'a> {
     /// Where light arrived, one entry a side; none where that is not known.
     pub fn moments(&self) -> &[Moments] {
         self.arrived.moments()
+    }
+
+    /// Sums of what coated sides reflected, one entry a side; none where that is not known.
+    pub fn coated(&self) -> &[DVec2] {
+        self.arrived.coated()
     }
 
     /// Rays traced so far.

@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec2, DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::RadiosityScene;
@@ -89,6 +89,17 @@ pub(super) struct Photons {
     pub loads: Vec<Load>,
     /// Flux that did not set out though the mean reflectance of its patch says so, W; negative where more did.
     kept: DVec3,
+    /// Light that coated sides reflected.
+    coated: Vec<Coated>,
+}
+
+/// Light that a side reflected which is not Lambertian. Sums of them tell how much more of it than of light from everywhere was reflected diffusely.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Coated {
+    /// The side.
+    pub side: u32,
+    /// Flux, W, and the same times the diffuse albedo towards where it came from over the mean of that.
+    pub flux: DVec2,
 }
 
 impl Photons {
@@ -102,6 +113,7 @@ impl Photons {
         self.rays.clear();
         self.loads.clear();
         self.kept = DVec3::ZERO;
+        self.coated.clear();
     }
 }
 
@@ -134,6 +146,7 @@ struct Scratch {
 #[derive(Default)]
 struct Output {
     landings: Vec<Landing>,
+    coated: Vec<Coated>,
     tally: Tally,
 }
 
@@ -160,7 +173,7 @@ impl Tracer<'_> {
                 let shot = &shots[at];
                 let index = u64::from(shot.rays) - (ends[at] - k);
                 let id = u64::from(shot.stream) << 32 | index;
-                let leaving = self.leaving(shot, sampling::sobol(index as u32, 0, shot.stream));
+                let leaving = self.leaving(shot, sampling::sobol(index as u32, 0, shot.stream), &mut photons.coated);
                 if let Some((ray, flux)) = leaving {
                     photons.push(ray, Load::new(flux, id));
                 }
@@ -172,7 +185,7 @@ impl Tracer<'_> {
 
     /// A ray of a shot and its flux, W. Where light is not reflected alike into all directions, the flux differs from ray to ray: what arrives
     /// along the surface, a coat reflects more of.
-    fn leaving(&self, shot: &Shot, s: [f32; 4]) -> Option<(Ray, DVec3)> {
+    fn leaving(&self, shot: &Shot, s: [f32; 4], coated: &mut Vec<Coated>) -> Option<(Ray, DVec3)> {
         let geometry = self.input.geometry;
         let place = shot.from.as_ref().map(|places| places.choose(s[0]));
         let point = match place {
@@ -186,6 +199,10 @@ impl Tracer<'_> {
             // Reflection is reciprocal.
             let on_scene = SurfacePoint { triangle, ..point };
             let bsdf = Bsdf::new(self.input.scene, &on_scene, place.from, Lobes::MIRRORS);
+            let (diffuse, mean) = (bsdf.albedo_diffuse().element_sum(), bsdf.mean_albedo_diffuse().element_sum());
+            let flux = shot.flux.element_sum();
+            let over_mean = if mean > 0.0 { f64::from(diffuse / mean) } else { 1.0 };
+            coated.push(Coated { side: shot.side, flux: DVec2::new(flux, flux * over_mean) });
             let sample = bsdf.sample_low([s[1], s[2], s[3]])?;
             let mean = self.optics.reflectance[shot.side as usize / 2];
             let weight = Vec3::select(mean.cmpgt(Vec3::ZERO), sample.weight / mean, Vec3::ZERO);
@@ -221,6 +238,7 @@ impl Tracer<'_> {
                 for landing in output.landings {
                     arrived.add(landing);
                 }
+                arrived.note_coated(&output.coated);
                 tally.add(&output.tally);
             }
         }
@@ -230,7 +248,8 @@ impl Tracer<'_> {
     fn follow(&self, scratch: &mut Scratch, deposit: Deposit) -> Output {
         let Scratch { photons, next, hits } = scratch;
         let tally = Tally { kept: photons.kept, ..Tally::default() };
-        let mut output = Output { landings: Vec::with_capacity(photons.rays.len()), tally };
+        let coated = std::mem::take(&mut photons.coated);
+        let mut output = Output { landings: Vec::with_capacity(photons.rays.len()), coated, tally };
         for depth in 0..MAX_CHAIN {
             if photons.rays.is_empty() {
                 return output;

@@ -36,7 +36,8 @@ pub struct Solution {
 /// The solution on one patch; front first.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(super) struct PatchSolution {
-    /// Radiosity without emission, W/m^2.
+    /// Radiosity without emission, W/m^2. Under a coat, and where it is known from where light arrived, it is that of which the diffuse part is right:
+    /// as much more or less of all of it is taken as of light from there is reflected diffusely.
     pub radiosity: [Vec3; 2],
     /// The part of `radiosity` that came straight from light sources, where that varies over the patch.
     pub uneven: [Option<Vec3>; 2],

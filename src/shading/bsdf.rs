@@ -145,6 +145,11 @@ impl Bsdf {
         self.layered.as_ref().map_or(self.reflectance, Layered::mean_albedo_low)
     }
 
+    /// The same of [`Bsdf::albedo_diffuse`].
+    pub fn mean_albedo_diffuse(&self) -> Vec3 {
+        self.layered.as_ref().map_or(self.reflectance, Layered::mean_albedo_diffuse)
+    }
+
     /// The same of the highly directional part (reflection and transmission): the share of power that goes on,
     /// without the change of radiance by the index of refraction.
     pub fn albedo_high(&self) -> Vec3 {

@@ -68,6 +68,8 @@ pub struct Layered {
     diffuse_scale: Vec3,
     /// Cosine-weighted average over `outgoing` of the weakly directional part's albedo.
     mean_albedo_low: Vec3,
+    /// The same of diffuse and multiple scattering.
+    mean_albedo_diffuse: Vec3,
     coat: Coat,
     glass: Option<Glass>,
 }
@@ -166,6 +168,7 @@ impl Layered {
             diffuse_albedo: opaque * at.base_color * (Vec3::ONE - coat.albedo(here)).max(Vec3::ZERO),
             diffuse_scale: let_through.recip(),
             mean_albedo_low: mean_diffuse + mean_rough,
+            mean_albedo_diffuse: mean_diffuse,
             coat,
             glass,
         }
@@ -189,6 +192,11 @@ impl Layered {
     /// Cosine-weighted average over outgoing directions of [`Layered::albedo_low`].
     pub fn mean_albedo_low(&self) -> Vec3 {
         self.mean_albedo_low
+    }
+
+    /// The same of [`Layered::albedo_diffuse`].
+    pub fn mean_albedo_diffuse(&self) -> Vec3 {
+        self.mean_albedo_diffuse
     }
 
     /// A direction (world) from the rough specular lobe alone, its `f cos / pdf` and `pdf`.

@@ -215,3 +215,22 @@ fn rough_reflection_leaves_in_its_direction() {
         assert!(error.cmplt(0.02 * exact).all() && exact.x > above * even, "{error} {exact} {even}");
     }
 }
+
+/// Light from straight above passes a coat more easily than light from everywhere: so much more is reflected diffusely, and looked up.
+#[test]
+fn what_is_looked_up_under_a_coat_knows_where_light_came_from() {
+    let floor = Material { base_color: Vec3::splat(0.5), metallic: 0.0, roughness: 0.3, ..Material::default() };
+    let square = [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]].map(|[x, y]| Vec3::new(x, y, 0.0));
+    let height = 100.0;
+    let kind = LightKind::Point { position: Vec3::new(0.0, 0.0, height) };
+    let room = Room::new(vec![(diced(square, 1), floor)], vec![light(height * height, kind)]);
+    let point = SurfacePoint::new(&room.scene, &Hit { t: 0.0, u: 0.3, v: 0.3, triangle: 0 });
+    let bsdf = Bsdf::new(&room.scene, &point, Vec3::Z, Lobes::MIRRORS);
+    let over_mean = bsdf.albedo_diffuse().x / bsdf.mean_albedo_diffuse().x;
+    // An irradiance of one.
+    let expected = bsdf.mean_albedo_low().x * over_mean;
+    let found = room.solve(&RadiosityParams::new(0.5)).unwrap().look_up(0, 0.3, 0.3, true).0.x;
+    println!("{found}, expected {expected}, {over_mean} times the mean");
+    // Cosines and distances differ by less than 5e-5 over the floor.
+    assert!((found / expected - 1.0).abs() < 2e-4 && over_mean > 1.02, "{found} {expected} {over_mean}");
+}
