@@ -61,8 +61,8 @@ pub struct RadiosityParams {
     /// is its whole area, as in the textbooks' form factors: exact for large patches that meet at an angle, too dark where furniture
     /// stands against a wall.
     pub leave_out_covered: bool,
-    /// Whether it is known where on a patch light arrived: reflected light leaves from there, and direct light that varies over a patch is told
-    /// apart ([`Solution::look_up`]). Without that a patch is lit and shines evenly, as the textbooks' form factors have it: light spreads over each
+    /// Whether it is known where on a patch light arrived, and from where: reflected light leaves from there, as the material reflects it, and direct light that varies over a patch is told
+    /// apart ([`Solution::look_up`]). Without that a patch is lit evenly and shines evenly into all directions, as the textbooks' form factors have it: light spreads over each
     /// patch that it meets, and through walls that patches reach beyond.
     pub keep_places: bool,
     /// How direct light reaches the patches.
@@ -205,7 +205,7 @@ pub fn solve(input: &RadiosityScene<'_>, params: &RadiosityParams, progress: &Pr
         let tracer = Tracer { input, patches: &patches, optics: &optics };
         average.solve(&tracer, params, progress)?;
     }
-    Ok(average.into_solution(input.geometry, patches, &optics))
+    Ok(average.into_solution(patches, &optics))
 }
 
 /// Mean of independent solutions, in two halves.
@@ -334,12 +334,13 @@ impl Average {
             for (sum, flux) in self.sums[half].iter_mut().zip(run.incident(params.ambient)) {
                 *sum += weight * flux;
             }
-            self.moments.resize(run.moments().len(), Moments::default());
-            for (sum, moments) in self.moments.iter_mut().zip(run.moments()) {
+            let arrived = run.arrived();
+            self.moments.resize(arrived.moments().len(), Moments::default());
+            for (sum, moments) in self.moments.iter_mut().zip(arrived.moments()) {
                 sum.add_times(weight, *moments);
             }
-            self.coated.resize(run.coated().len(), DVec2::ZERO);
-            for (sum, coated) in self.coated.iter_mut().zip(run.coated()) {
+            self.coated.resize(arrived.coated().len(), DVec2::ZERO);
+            for (sum, coated) in self.coated.iter_mut().zip(arrived.coated()) {
                 *sum += weight * coated;
             }
             self.ledger.add(&run.ledger(), 0.5 * weight);
@@ -371,7 +372,7 @@ impl Average {
         }
     }
 
-    fn into_solution(self, geometry: &SimplifiedGeometry, patches: Patches, optics: &Optics) -> Solution {
+    fn into_solution(self, patches: Patches, optics: &Optics) -> Solution {
         let error = self.error(&patches, optics) as f32;
         let scale = if self.weight > 0.0 { 0.5 / self.weight } else { 0.0 };
         let mut ledger = Ledger::default();
@@ -391,7 +392,7 @@ impl Average {
                 solution
             })
             .collect();
-        let found = slope::find(geometry, &patches, &self.moments, |side| self.uneven[side as usize].is_some());
+        let found = slope::find(&patches, &self.moments, |side| self.uneven[side as usize].is_some());
         log::debug!("light slopes on {} of {} sides", found.len(), 2 * patches.len());
         let mut slopes = Vec::with_capacity(found.len());
         for (number, (side, slope)) in (0..).zip(found) {

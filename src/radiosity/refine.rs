@@ -1,12 +1,11 @@
 //! Progressive refinement: the sides with the largest unshot flux shoot first, until little is left.
 
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 use rayon::prelude::*;
 
 use super::arrived::Arrived;
 use super::ledger::{Ledger, Tally};
 use super::shoot::{Shot, Tracer};
-use super::slope::Moments;
 use crate::error::{Error, Result};
 use crate::progress::Progress;
 use crate::sampling;
@@ -107,14 +106,9 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Where light arrived, one entry a side; none where that is not known.
-    pub fn moments(&self) -> &[Moments] {
-        self.arrived.moments()
-    }
-
-    /// Sums of what coated sides reflected, one entry a side; none where that is not known.
-    pub fn coated(&self) -> &[DVec2] {
-        self.arrived.coated()
+    /// All light that arrived.
+    pub fn arrived(&self) -> &Arrived {
+        &self.arrived
     }
 
     /// Rays traced so far.

@@ -13,7 +13,7 @@ use super::optics::Optics;
 use super::patches::Patches;
 use crate::backend::{Coherence, Hit, Ray, Visible, edge};
 use crate::sampling;
-use crate::shading::{Bsdf, Lobes, SurfacePoint};
+use crate::shading::{Bsdf, Lobes, SurfacePoint, share_of};
 use crate::simplify::TriangleSource;
 
 /// Rays traced in one call of the backend. What a chunk deposits fits into memory that an allocator keeps at hand.
@@ -205,7 +205,7 @@ impl Tracer<'_> {
             coated.push(Coated { side: shot.side, flux: DVec2::new(flux, flux * over_mean) });
             let sample = bsdf.sample_low([s[1], s[2], s[3]])?;
             let mean = self.optics.reflectance[shot.side as usize / 2];
-            let weight = Vec3::select(mean.cmpgt(Vec3::ZERO), sample.weight / mean, Vec3::ZERO);
+            let weight = share_of(sample.weight, mean, Vec3::ZERO);
             let ray = Ray::new(point.ray_origin(sample.direction), sample.direction);
             return Some((ray, shot.flux * weight.as_dvec3()));
         }

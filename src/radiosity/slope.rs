@@ -15,7 +15,6 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::patches::{MIDDLE, Patches};
-use crate::simplify::SimplifiedGeometry;
 
 /// Least relative standard deviation of the fit over a side: less is nothing to the errors of single patches.
 const LEAST: f64 = 0.1;
@@ -86,18 +85,13 @@ struct Known {
 
 /// The slopes of those sides that have one, in ascending order. Equivalent boxes are looked up as they are. What is looked up of an `uneven` side
 /// is of another kind than of its neighbours.
-pub(super) fn find(
-    geometry: &SimplifiedGeometry,
-    patches: &Patches,
-    moments: &[Moments],
-    uneven: impl Fn(u32) -> bool + Sync,
-) -> Vec<(u32, Slope)> {
+pub(super) fn find(patches: &Patches, moments: &[Moments], uneven: impl Fn(u32) -> bool + Sync) -> Vec<(u32, Slope)> {
     let known = |side: u32| {
         if patches.box_cell[side as usize / 2].is_some() {
             return None;
         }
         let (centroid, chance) = moments[side as usize].centroid()?;
-        let shape = patches.open_shape(geometry, side);
+        let shape = patches.open_shape(side);
         let covariance = shape.covariance + DMat2::from_diagonal(DVec2::splat(LEAST_VARIANCE));
         Some(Known { mean: shape.mean, shift: centroid - shape.mean, covariance, chance })
     };

@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::path::Path;
 use crate::lighting::LightSample;
 use crate::scene::Material;
-use crate::shading::{Bsdf, fresnel};
+use crate::shading::{Bsdf, fresnel, share_of};
 
 /// Share of paths that gather rough reflection apart from diffuse, per unit of its albedo.
 const PATHS_PER_ALBEDO: f32 = 4.0;
@@ -32,8 +32,7 @@ impl LookUp {
         if !self.rough {
             return Vec3::ONE;
         }
-        let all = bsdf.mean_albedo_low();
-        Vec3::select(all.cmpgt(Vec3::ZERO), bsdf.albedo_diffuse() / all, Vec3::ZERO)
+        share_of(bsdf.albedo_diffuse(), bsdf.mean_albedo_low(), Vec3::ZERO)
     }
 
     /// `f cos` for a sampled light source, of what is not in the radiance: rough and glossy reflection, and all of it where direct light is not.

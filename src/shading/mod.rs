@@ -16,5 +16,12 @@ mod testing;
 #[cfg(test)]
 mod tests;
 
+use glam::Vec3;
+
 pub use bsdf::{Bsdf, BsdfSample, Lobes};
 pub use point::SurfacePoint;
+
+/// `part / whole` by band, and `of_nothing` in bands where there is no whole.
+pub fn share_of(part: Vec3, whole: Vec3, of_nothing: Vec3) -> Vec3 {
+    Vec3::select(whole.cmpgt(Vec3::ZERO), part / whole, of_nothing)
+}

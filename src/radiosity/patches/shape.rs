@@ -1,10 +1,9 @@
 //! What of its cell a patch fills, and what lies beside it.
 
-use glam::{DMat2, DVec2};
+use glam::{DMat2, DVec2, Vec2};
 
 use super::{Patches, Piece};
 use crate::sampling;
-use crate::simplify::SimplifiedGeometry;
 
 /// Points that stand for the open part of a side that is partly covered.
 const POINTS: u32 = 64;
@@ -36,7 +35,7 @@ fn square(d: DVec2) -> DMat2 {
 
 impl Patches {
     /// The shape of the open part of a side.
-    pub fn open_shape(&self, geometry: &SimplifiedGeometry, side: u32) -> Shape {
+    pub fn open_shape(&self, side: u32) -> Shape {
         let (mut weight, mut sum, mut squares) = (0.0, DVec2::ZERO, DMat2::ZERO);
         let mut add = |share: f64, mean: DVec2, second: DMat2| {
             weight += share;
@@ -56,8 +55,8 @@ impl Patches {
         } else {
             for i in 0..POINTS {
                 let [u, v, ..] = sampling::sobol(i, 0, side);
-                let point = self.open_point(geometry, side, [u, v]);
-                let at = self.map.locate(point.triangle, point.u, point.v).1.as_dvec2() - MIDDLE;
+                let (triangle, uv) = self.sample(side / 2, self.exposure.onto_open(side, [u, v]));
+                let at = self.map.locate(triangle, uv.x, uv.y).1.as_dvec2() - MIDDLE;
                 add(1.0, at, square(at));
             }
         }
@@ -71,7 +70,7 @@ impl Patches {
     }
 
     fn corners_in_cell(&self, piece: &Piece) -> [DVec2; 3] {
-        let middle = piece.uv.iter().sum::<glam::Vec2>() / 3.0;
+        let middle = piece.uv.iter().sum::<Vec2>() / 3.0;
         let (at, local) =
             (self.map.grid_coordinates(piece.triangle, middle), self.map.locate(piece.triangle, middle.x, middle.y).1);
         piece.uv.map(|uv| (self.map.grid_coordinates(piece.triangle, uv) - at + local).as_dvec2() - MIDDLE)

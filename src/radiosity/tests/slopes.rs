@@ -88,7 +88,7 @@ fn slopes_by_chance(g: DVec2, seed: u32) -> Vec<Option<Slope>> {
             }
         }
     }
-    let found: HashMap<u32, Slope> = slope::find(&room.geometry, &patches, &moments, |_| false).into_iter().collect();
+    let found: HashMap<u32, Slope> = slope::find(&patches, &moments, |_| false).into_iter().collect();
     (0..16).map(|patch| found.get(&(2 * patch)).copied()).collect()
 }
 

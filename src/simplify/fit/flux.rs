@@ -17,6 +17,7 @@ use super::{LEAST_THICKNESS, Probe, Stage, fill_patches, frame_along, half_surfa
 use crate::backend::RayBackend;
 use crate::error::Result;
 use crate::scene::Scene;
+use crate::shading::share_of;
 
 /// Fewest lines for one cluster; the number doubles until the error is small or the budget is used up.
 pub const LEAST_LINES: u32 = 1024;
@@ -173,7 +174,7 @@ fn face_area(edges: Vec3, axis: usize) -> f64 {
 fn match_mean(reflectance: &mut [Vec<Vec3>; 6], edges: Vec3, albedo: Vec3) {
     let brightest = reflectance.iter().flatten().fold(albedo, |m, r| m.max(*r));
     let mean = mean_reflectance(reflectance, edges);
-    let factor = Vec3::select(mean.cmpgt(Vec3::ZERO), albedo / mean, Vec3::ONE);
+    let factor = share_of(albedo, mean, Vec3::ONE);
     for patch in reflectance.iter_mut().flatten() {
         *patch = (*patch * factor).min(brightest);
     }
