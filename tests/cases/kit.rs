@@ -302,7 +302,12 @@ pub fn one_patch(error: f64, seed: u32) -> RadiosityParams {
 
 /// Values for each of [`SEEDS`] seeds, and the estimate of each value.
 pub fn over_seeds(values: impl Fn(u32) -> Vec<f64>) -> Vec<Estimate> {
-    transposed(&(0..SEEDS).map(|s| values(hash_all(&[0x5eed, s]))).collect::<Vec<_>>())
+    over_some_seeds(SEEDS, values)
+}
+
+/// The same for another number of seeds.
+pub fn over_some_seeds(seeds: u32, values: impl Fn(u32) -> Vec<f64>) -> Vec<Estimate> {
+    transposed(&(0..seeds).map(|s| values(hash_all(&[0x5eed, s]))).collect::<Vec<_>>())
 }
 
 fn transposed(by_seed: &[Vec<f64>]) -> Vec<Estimate> {

@@ -32,7 +32,7 @@ type Recipe = fn(&Case, &mut Outcome<'_>);
 /// Cases that are known to fail, with the reason.
 const KNOWN: &[(&str, &str)] = &[];
 
-/// The case that takes longest, four minutes: it is begun first, so that no core waits for it in the end.
+/// The case that takes longest, a minute: it is begun first, so that no core waits for it in the end.
 const LONGEST: &str = "SPEC-006";
 
 fn recipe(id: &str) -> Option<Recipe> {

@@ -123,6 +123,9 @@ fn interval(values: &[f64]) -> (f64, f64) {
 /// makes all of a caustic's difference.
 #[test]
 fn photons_and_gather_rays_bring_the_same_light() {
+    const SEEDS: u32 = 8;
+    // The caustic is only what differences are held against, and two seeds know it to a fifth of a per cent.
+    const DARK: u32 = 2;
     let cases = [
         ("glass", Bender::Ball, Method::Pmm, 0.0, 0.05),
         ("glass", Bender::Ball, Method::Gsii, 0.3, 0.05),
@@ -132,7 +135,7 @@ fn photons_and_gather_rays_bring_the_same_light() {
     for (name, bender, method, filter_glossy, tolerance) in cases {
         let scene = room(bender, Lamp::Cube(0.06));
         let (mut differences, mut caustics) = (Vec::new(), Vec::new());
-        for seed in 0..8 {
+        for seed in 0..SEEDS {
             let r_thresh = (method == Method::Gsii).then_some(0.8);
             let radiosity =
                 Settings { radiosity_error: 1.0, unshot: 0.1, patch_size: Some(0.3), ..Settings::default() };
@@ -144,11 +147,13 @@ fn photons_and_gather_rays_bring_the_same_light() {
             let world = prepared.world();
             let with = of(&world, 100 + seed);
             let without = of(&World { caustics: None, ..world }, 100 + seed);
-            // No photons, and gather rays leave the light to them all the same: what is left out is the caustic.
-            let none = world.caustics.unwrap().emptied();
-            let dark = of(&World { caustics: Some(&none), ..world }, 100 + seed);
             differences.push(mean(&with) - mean(&without));
-            caustics.push(mean(&with) - mean(&dark));
+            if seed < DARK {
+                // No photons, and gather rays leave the light to them all the same: what is left out is the caustic.
+                let none = world.caustics.unwrap().emptied();
+                let dark = of(&World { caustics: Some(&none), ..world }, 100 + seed);
+                caustics.push(mean(&with) - mean(&dark));
+            }
         }
         let ((difference, error), (caustic, _)) = (interval(&differences), interval(&caustics));
         println!(

@@ -555,7 +555,7 @@ fn light_from_outside_on_the_command_line() {
 }
 
 /// Images of the tests that interrupt writing: so large that writing takes a while, and with little work before.
-const LARGE: [&str; 8] = ["--width", "640", "--height", "480", "--spp", "1", "--method", "mcpt"];
+const LARGE: [&str; 10] = ["--width", "640", "--height", "480", "--spp", "1", "--method", "mcpt", "--max-depth", "1"];
 
 #[test]
 fn a_killed_run_leaves_complete_files_or_none() {

@@ -111,6 +111,8 @@ fn the_limits_are_pmm_and_path_tracing_bit_for_bit_in_real_scenes() {
         let scene = Arc::new(gsii::scene::load(&path, &Default::default()).unwrap());
         let image = |settings: Settings| bits(&values(&render(&prepare(&scene, settings).0, &params).film));
         for (r_thresh, method) in [(0.0, Method::Pmm), (f32::INFINITY, Method::Mcpt)] {
+            // Equal bits need no precise solution.
+            let with = |method| Settings { radiosity_error: 0.3, ..with(method) };
             let gsii = image(Settings { r_thresh: Some(r_thresh), ..with(Method::Gsii) });
             assert!(gsii == image(with(method)), "{name}: r_thresh {r_thresh} is not {method:?}");
         }

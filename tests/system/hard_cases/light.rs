@@ -77,9 +77,6 @@ fn cameras_inside_of_clutter() {
     let cameras: Vec<_> = [v(1.0, 0.2, 0.1), v(-0.3, 0.1, 1.0), v(0.2, -1.0, 0.3)]
         .map(|towards| look_at(&scene, v(0.495, 0.495, 0.495), towards, 1e-3, 4e-3))
         .to_vec();
-    for (i, seen) in radiance_of(&scene, &mcpt(), &cameras, [8, 8], 512, Part::All).into_iter().enumerate() {
-        println!("mcpt view {i}: {:?}", seen.times(PI));
-    }
     for (i, seen) in radiance_of(&scene, &settings, &cameras, [8, 8], 64, Part::All).into_iter().enumerate() {
         let seen = seen.times(PI);
         println!("view {i}: {seen:?}");

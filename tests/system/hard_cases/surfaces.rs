@@ -149,9 +149,12 @@ fn small_things_in_huge_halls() {
     for (what, settings) in [("path tracing", mcpt()), ("GSII", gsii)] {
         let [open, hall] = [false, true].map(|hall| {
             let scene = desk(hall).finish();
-            radiance_of(&scene, &settings, &cameras(&scene), [4, 4], 256, Part::All)
+            // Nothing beyond `r_thresh` reflects light to where the cameras look, so that solutions do not differ there, and two are
+            // enough: in the hall each has hundreds of thousands of patches.
+            let prepared = [1, 2].map(|seed| prepare(&scene, Settings { seed, ..settings.clone() }).unwrap());
+            all_parts_of(&prepared, &cameras(&scene), [4, 4], 256).into_iter().map(|parts| parts[Part::All as usize])
         });
-        for (place, (a, b)) in ["pencil", "shadow", "desk"].iter().zip(open.into_iter().zip(hall)) {
+        for (place, (a, b)) in ["pencil", "shadow", "desk"].iter().zip(open.zip(hall)) {
             let error = a.error.hypot(b.error);
             println!("{what}, {place}: {a:?} {b:?}");
             assert!(a.mean > 0.0, "{what}, {place}");
