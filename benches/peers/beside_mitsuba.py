@@ -158,12 +158,16 @@ def mitsuba_scene(glb, size, folder):
         strength = material.get("extensions", {}).get("KHR_materials_emissive_strength", {}).get("emissiveStrength", 1)
         emitted = [strength * e for e in material.get("emissiveFactor", [0, 0, 0])]
         if any(emitted):
+            if material.get("doubleSided", False):
+                sys.exit("light sources that shine to both sides are not known to Mitsuba")
             shape["emitter"] = {"type": "area", "radiance": {"type": "rgb", "value": emitted}}
             shape["bsdf"] = diffuse
         else:
             shape["bsdf"] = {"type": "twosided", "inside": diffuse}
         scene[f"part{number}"] = shape
-    node, matrix = next((n, m) for n, m in glb.nodes() if "camera" in n)
+    node, matrix = next(((n, m) for n, m in glb.nodes() if "camera" in n), (None, None))
+    if node is None:
+        sys.exit("the scene has no camera")
     camera = glb.doc["cameras"][node["camera"]]["perspective"]
     # Cameras look along -z there and along +z here.
     turned = matrix @ np.diag([-1.0, 1.0, -1.0, 1.0])
