@@ -23,4 +23,6 @@ for scene in "$@"; do
     echo "$scene"
     target/release/gsii render "$scene" -o "out/bench/$name.exr" -o "out/bench/$name.png" --width 320 --height 180 \
         --stats "$folder/$name.json"
+    # Where the scene lay here means nothing elsewhere.
+    sed -i "s|\(\"scene\": \"\).*/|\1|" "$folder/$name.json"
 done
