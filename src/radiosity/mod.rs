@@ -61,9 +61,10 @@ pub struct RadiosityParams {
     /// is its whole area, as in the textbooks' form factors: exact for large patches that meet at an angle, too dark where furniture
     /// stands against a wall.
     pub leave_out_covered: bool,
-    /// Whether it is known where on a patch light arrived, and from where: reflected light leaves from there, as the material reflects it, and direct light that varies over a patch is told
-    /// apart ([`Solution::look_up`]). Without that a patch is lit evenly and shines evenly into all directions, as the textbooks' form factors have it: light spreads over each
-    /// patch that it meets, and through walls that patches reach beyond.
+    /// Whether it is known where on a patch light arrived, and from where: reflected light leaves from there, as the material reflects
+    /// it, and direct light that varies over a patch is told apart ([`Solution::look_up`]). Without that a patch is lit evenly and shines
+    /// evenly into all directions, as the textbooks' form factors have it: light spreads over each patch that it meets, and through walls
+    /// that patches reach beyond.
     pub keep_places: bool,
     /// How direct light reaches the patches.
     pub direct: DirectLight,

@@ -260,7 +260,8 @@ fn spec_006_mirror_ball(case: &Case, out: &mut Outcome<'_>) {
     // Incident flux on each of the named parts, shooting `rays` rays in all; the screen at a height where the light for the parts passes
     // below it. What `of_fluxes` makes of it, over seeds.
     let caustic = |parts: &[(String, Triangles)],
-                   [polished, rays]: [u32; 2],
+                   polished: u32,
+                   rays: u64,
                    screen: f64,
                    patch_size: f64,
                    of_fluxes: &dyn Fn(&[f64]) -> Vec<f64>| {
@@ -280,7 +281,7 @@ fn spec_006_mirror_ball(case: &Case, out: &mut Outcome<'_>) {
         room.scene = Arc::new(scene);
         over_seeds(|seed| {
             // No error is reached: all rays are shot.
-            let all = RadiosityParams { max_rays: rays.into(), ..once(DirectLight::Shoot, patch_size, 1e-6, seed) };
+            let all = RadiosityParams { max_rays: rays, ..once(DirectLight::Shoot, patch_size, 1e-6, seed) };
             let solution = room.solve(&all).unwrap();
             let flux = |(name, _): &(String, Triangles)| {
                 let triangles = room.triangles(name);
@@ -292,14 +293,14 @@ fn spec_006_mirror_ball(case: &Case, out: &mut Outcome<'_>) {
     let (e, inside) = (case.values("/E_reflected"), case.values("/flux_inside"));
     // Only light that grazes the ball arrives close to it: there, bands up to 5.6 degrees are mirrors (what the next one reflects arrives at
     // 0.7), and most rays end on the others. Each ring is one patch, so that its flux is exact.
-    let floors = [(0, 2, [BANDS / 4, 1 << 19], 1.04), (2, 7, [BANDS, 1 << 17], 1.36)];
-    for (first, last, shot, height) in floors {
+    let floors = [(0, 2, BANDS / 4, 1 << 19, 1.04), (2, 7, BANDS, 1 << 17, 1.36)];
+    for (first, last, polished, rays, height) in floors {
         let rings = radii[..last].iter().flat_map(|r| [(r * (1.0 - WIDTH)).max(0.5), *r, r * (1.0 + WIDTH)]);
         let mut edges: Vec<f64> = [0.0, 0.5].into_iter().chain(rings).collect();
         edges.sort_by(f64::total_cmp);
         edges.dedup();
         let parts: Vec<_> = edges.windows(2).map(|w| (format!("up to {}", w[1]), ring(w[0], w[1]))).collect();
-        let measured = caustic(&parts, shot, height, 1e3, &|flux| {
+        let measured = caustic(&parts, polished, rays, height, 1e3, &|flux| {
             let within =
                 |r: f64| edges.windows(2).zip(flux).skip(1).filter(|(w, _)| w[1] <= r).map(|(_, f)| f).sum::<f64>();
             let at = |r: f64| {
@@ -322,7 +323,7 @@ fn spec_006_mirror_ball(case: &Case, out: &mut Outcome<'_>) {
         .filter(|t| (t[0] + t[1] + t[2]).z / 3.0 < 1.0 + 0.5 * 0.5_f64.sqrt())
         .map(|[a, b, c]| [a, c, b])
         .collect();
-    let total = caustic(&[("bowl".to_owned(), bowl)], [BANDS, 1 << 15], 1.36, 0.1, &|flux| flux.to_vec())[0];
+    let total = caustic(&[("bowl".to_owned(), bowl)], BANDS, 1 << 15, 1.36, 0.1, &|flux| flux.to_vec())[0];
     let expected = case.values("/flux_total")[0];
     out.mean("all flux downward", expected, total, case.tolerance("/flux_rel") * expected);
 }
