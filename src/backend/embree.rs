@@ -100,6 +100,9 @@ unsafe impl Sync for Device {}
 impl Device {
     /// `threads` build the acceleration structure; 0 for as many as there are cores.
     fn new(threads: usize) -> Result<Self> {
+        // Where one thread is allowed, oneTBB starts a second for Embree's tasks and never lets it work or sleep: it takes a whole core
+        // for as long as the device lives (oneTBB issue 1417).
+        let threads = if threads == 1 { 2 } else { threads };
         let config = CString::new(format!("threads={threads}")).map_err(|e| failed(e.to_string()))?;
         // SAFETY: `config` is NUL-terminated and only read during the call.
         let raw = unsafe { sys::rtcNewDevice(config.as_ptr()) };
@@ -201,8 +204,8 @@ pub struct EmbreeBackend {
 }
 
 impl EmbreeBackend {
-    /// `threads` build the acceleration structures; 0 for as many as there are cores. Rays are traced in the threads
-    /// that ask.
+    /// `threads` build the acceleration structures, at least two; 0 for as many as there are cores. Rays are traced in the
+    /// threads that ask.
     ///
     /// # Errors
     /// [`Error::Backend`] when Embree does not start, or is not the version this program was built for.

@@ -84,6 +84,24 @@ fn files_that_are_no_scenes_are_refused_in_one_line() {
     }
 }
 
+/// Embree's scheduler must not keep a core busy that it was not given.
+#[test]
+fn one_thread_takes_one_core() {
+    let bench = Bench::new();
+    let office = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/office-high.glb");
+    let small = ["--width", "96", "--spp", "32", "--method", "mcpt", "--measure-bias", "0"];
+    let output =
+        bench.gsii(&[&["render", office, "-o", "a.exr", "--threads", "1", "--stats", "a.json"], &small[..]].concat());
+    assert!(output.status.success(), "{}", stderr(&output));
+    let stats: serde_json::Value = serde_json::from_slice(&std::fs::read(bench.path("a.json")).unwrap()).unwrap();
+    let spent = |clock: &str| {
+        let of = |stage: &str| stats[clock][stage].as_f64().unwrap();
+        of("total") - of("build")
+    };
+    // A core in vain would make it 2; Embree may build its trees with a second thread.
+    assert!(spent("cpu_seconds") < 1.5 * spent("seconds"), "{stats}");
+}
+
 #[test]
 fn options_that_make_no_sense_are_refused() {
     let bench = Bench::new();
