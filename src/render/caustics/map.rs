@@ -8,6 +8,8 @@ use kiddo::immutable::float::kdtree::ImmutableKdTree;
 use kiddo::{NearestNeighbour, SquaredEuclidean};
 use rayon::prelude::*;
 
+use super::grid::{Near, ReachGrid};
+
 /// Photons that an estimate is made from, where there are enough.
 const NEAREST: usize = 64;
 
@@ -41,9 +43,11 @@ pub(super) struct Photon {
 #[derive(Clone, Debug, Default)]
 pub(super) struct PhotonMap {
     pub(super) photons: Vec<Photon>,
-    /// `None` without photons.
-    tree: Option<ImmutableKdTree<f32, u32, 3, 32>>,
     reach: f32,
+    /// Answers where few photons reach.
+    grid: ReachGrid,
+    /// Answers elsewhere; `None` without photons.
+    tree: Option<ImmutableKdTree<f32, u32, 3, 32>>,
     /// Every so many photons: places where the irradiance by all others is known, if they are dense.
     places: Option<ImmutableKdTree<f32, u32, 3, 32>>,
     irradiance: Vec<Option<Vec3>>,
@@ -57,11 +61,12 @@ impl PhotonMap {
             (!positions.is_empty()).then(|| ImmutableKdTree::new_from_slice(&positions))
         };
         let (tree, places) = (tree(1), tree(KNOWN));
-        let mut map = PhotonMap { photons, tree, reach, places, irradiance: Vec::new() };
+        let grid = ReachGrid::new(photons.iter().map(|p| p.position), reach);
+        let mut map = PhotonMap { photons, reach, grid, tree, places, irradiance: Vec::new() };
         let at = |number: usize| {
             let photon = &map.photons[number];
             let itself = Some(number as u32);
-            let around = map.around(photon.position, itself);
+            let around = map.around(map.grid.near(photon.position), photon.position, itself);
             let dense = around.found.len() == NEAREST;
             dense.then(|| map.sum(&around, photon.position, photon.normal, &|_| Vec3::ONE))
         };
@@ -84,33 +89,65 @@ impl PhotonMap {
         diffuse: Option<Vec3>,
         scatter: &dyn Fn(Vec3) -> Vec3,
     ) -> Vec3 {
+        let near = self.grid.near(position);
+        if near == Near::Few(&[]) {
+            return Vec3::ZERO;
+        }
         if let Some(diffuse) = diffuse
-            && let Some(irradiance) = self.known(position, normal)
+            && let Some(irradiance) = self.known(near, position, normal)
         {
             return diffuse * irradiance;
         }
         let per_flux = |toward: Vec3| scatter(toward) / normal.dot(toward).max(GRAZING);
-        self.sum(&self.around(position, None), position, normal, &per_flux)
+        self.sum(&self.around(near, position, None), position, normal, &per_flux)
     }
 
     /// The irradiance at the nearest place, where it is known and on the same surface.
-    fn known(&self, position: Vec3, normal: Vec3) -> Option<Vec3> {
-        let nearest = self.places.as_ref()?.nearest_one::<SquaredEuclidean>(&position.to_array());
-        let photon = &self.photons[KNOWN * nearest.item as usize];
-        let off_plane = normal.dot(photon.position - position).abs() > OFF_PLANE * nearest.distance.sqrt();
-        let same = normal.dot(photon.normal) > SAME_SURFACE && !off_plane && nearest.distance < self.reach * self.reach;
-        self.irradiance[nearest.item as usize].filter(|_| same)
+    fn known(&self, near: Near<'_>, position: Vec3, normal: Vec3) -> Option<Vec3> {
+        let (place, distance2) = match near {
+            Near::Few(few) => {
+                let places = few.iter().filter(|&&number| number as usize % KNOWN == 0);
+                let (number, distance2) = places
+                    .map(|&number| (number, self.distance2(number, position)))
+                    .min_by(|a, b| a.1.total_cmp(&b.1))?;
+                (number as usize / KNOWN, distance2)
+            }
+            Near::Many => {
+                let nearest = self.places.as_ref()?.nearest_one::<SquaredEuclidean>(&position.to_array());
+                (nearest.item as usize, nearest.distance)
+            }
+        };
+        let photon = &self.photons[KNOWN * place];
+        let off_plane = normal.dot(photon.position - position).abs() > OFF_PLANE * distance2.sqrt();
+        let same = normal.dot(photon.normal) > SAME_SURFACE && !off_plane && distance2 < self.reach * self.reach;
+        self.irradiance[place].filter(|_| same)
     }
 
-    /// The nearest photons within reach, but for one.
-    fn around(&self, position: Vec3, but: Option<u32>) -> Around {
+    fn distance2(&self, number: u32, position: Vec3) -> f32 {
+        self.photons[number as usize].position.distance_squared(position)
+    }
+
+    /// The nearest photons within reach, but for one, among those that are `near`.
+    fn around(&self, near: Near<'_>, position: Vec3, but: Option<u32>) -> Around {
         let reach2 = self.reach * self.reach;
-        let Some(tree) = &self.tree else { return Around { found: Vec::new(), radius2: reach2 } };
-        let most = NonZero::<usize>::MIN.saturating_add(NEAREST + usize::from(but.is_some()));
-        let mut found = tree.nearest_n_within::<SquaredEuclidean>(&position.to_array(), reach2, most, true);
+        let mut found: Vec<NearestNeighbour<f32, u32>> = match (near, &self.tree) {
+            (Near::Few(few), _) => {
+                let all = few.iter().map(|&item| NearestNeighbour { distance: self.distance2(item, position), item });
+                all.filter(|f| f.distance < reach2).collect()
+            }
+            (Near::Many, Some(tree)) => {
+                let most = NonZero::<usize>::MIN.saturating_add(NEAREST + usize::from(but.is_some()));
+                tree.nearest_n_within::<SquaredEuclidean>(&position.to_array(), reach2, most, true)
+            }
+            (Near::Many, None) => Vec::new(),
+        };
         found.retain(|f| Some(f.item) != but);
-        let radius2 = found.get(NEAREST).map_or(reach2, |beyond| beyond.distance);
-        found.truncate(NEAREST);
+        let mut radius2 = reach2;
+        if found.len() > NEAREST {
+            found.select_nth_unstable_by(NEAREST, |a, b| a.distance.total_cmp(&b.distance).then(a.item.cmp(&b.item)));
+            radius2 = found[NEAREST].distance;
+            found.truncate(NEAREST);
+        }
         Around { found, radius2 }
     }
 

@@ -16,6 +16,7 @@
 //! tracing uses no photons: caustics from lights without area are missing there.
 
 mod aim;
+mod grid;
 mod map;
 mod sources;
 mod targets;
