@@ -478,7 +478,7 @@ impl World<'_> {
         };
         let Some(sample) = sample else { return };
         rest /= share;
-        let pdf = if look_up.is_some() { sample.pdf } else { bsdf.pdf_rough(sample.direction).filter(|_| shares) };
+        let pdf = sample.pdf.filter(|_| look_up.is_some() || shares && bsdf.is_rough());
         let arrival = match pdf {
             Some(pdf) => Arrival::Glossy { pdf, position: point.position, normal: facing },
             None => Arrival::Soft,
@@ -516,8 +516,9 @@ impl World<'_> {
             return unbending.eval_low(light.direction);
         }
         let (high, high_pdf) = bsdf.eval_high(light.direction);
-        let rough_pdf = bsdf.pdf_rough(light.direction).filter(|_| shares).unwrap_or(0.0);
-        bsdf.eval_low(light.direction) * light.share(rough_pdf) + high * light.share(high_pdf)
+        let (low, low_pdf) = bsdf.eval_low_with_pdf(light.direction);
+        let rough_pdf = if shares && bsdf.is_rough() { low_pdf } else { 0.0 };
+        low * light.share(rough_pdf) + high * light.share(high_pdf)
     }
 
     /// Share of met emission that counts: the rest is next-event estimation's at the start of the ray.

@@ -164,13 +164,7 @@ impl Bsdf {
 
     /// `f_l cos` for light arriving from `incoming`.
     pub fn eval_low(&self, incoming: Vec3) -> Vec3 {
-        if self.geometric_normal.dot(incoming) <= 0.0 {
-            return Vec3::ZERO;
-        }
-        match &self.layered {
-            None => self.reflectance * (self.shading_normal.dot(incoming).max(0.0) * FRAC_1_PI),
-            Some(layered) => layered.eval_low(incoming).0,
-        }
+        self.eval_low_with_pdf(incoming).0
     }
 
     /// The part of [`Bsdf::eval_low`] that is no rough reflection.
@@ -190,12 +184,25 @@ impl Bsdf {
         }
     }
 
-    /// Density with which [`Bsdf::sample_low`] chooses `incoming`, where rough reflection is all that is not diffuse; `None` elsewhere.
-    pub fn pdf_rough(&self, incoming: Vec3) -> Option<f32> {
-        let layered = self.layered.as_ref()?;
-        let rough = layered.albedo_rough() != Vec3::ZERO && layered.albedo_high() == Vec3::ZERO;
-        let above = self.geometric_normal.dot(incoming) > 0.0;
-        rough.then(|| if above { layered.eval_low(incoming).1 } else { 0.0 })
+    /// Whether rough reflection is all that is not diffuse: then what arrives along samples of [`Bsdf::sample_low`] may share light sources
+    /// with next-event estimation.
+    pub fn is_rough(&self) -> bool {
+        let rough = |layered: &Layered| layered.albedo_rough() != Vec3::ZERO && layered.albedo_high() == Vec3::ZERO;
+        self.layered.as_ref().is_some_and(rough)
+    }
+
+    /// [`Bsdf::eval_low`] and the density with which [`Bsdf::sample_low`] chooses `incoming`.
+    pub fn eval_low_with_pdf(&self, incoming: Vec3) -> (Vec3, f32) {
+        if self.geometric_normal.dot(incoming) <= 0.0 {
+            return (Vec3::ZERO, 0.0);
+        }
+        match &self.layered {
+            None => {
+                let pdf = self.shading_normal.dot(incoming).max(0.0) * FRAC_1_PI;
+                (self.reflectance * pdf, pdf)
+            }
+            Some(layered) => layered.eval_low(incoming),
+        }
     }
 
     /// `f_h cos` of the part of f_h that is no delta function, and its sampling density.
