@@ -152,8 +152,8 @@ fn is_enough(run: &Run, point: &Point) -> bool {
     let [all, part] = ENOUGH;
     let below = |errors: Option<Errors>, level: f64| errors.is_none_or(|e| e.rel_mse < level);
     let parts = below(point.direct, part) && below(point.indirect, part);
-    // Prices of direct and indirect light are asked of GSII only.
-    below(point.whole, all) && (run.role != Role::Gsii || parts)
+    // Prices of direct and indirect light, and the paper's difference of indirect light, are asked of GSII only.
+    below(point.whole, all) && (parts || !matches!(run.role, Role::Gsii | Role::AtPaperRThresh))
 }
 
 /// As `gsii render --error` prepares a scene.
