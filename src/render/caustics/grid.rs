@@ -1,6 +1,7 @@
 //! Photons within reach of a place, where there are few: most places have none at all.
 
 use glam::{IVec3, Vec3};
+use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 /// Most photons that are looked at one by one.
@@ -41,7 +42,7 @@ impl ReachGrid {
                 }
             }
         }
-        entries.sort_unstable();
+        entries.par_sort_unstable();
         let mut grid = ReachGrid { scale, numbers: entries.iter().map(|e| e.1).collect(), ..ReachGrid::default() };
         let mut first = 0;
         for group in entries.chunk_by(|a, b| a.0 == b.0) {
