@@ -106,7 +106,7 @@ impl PhotonMap {
     fn known(&self, near: Near<'_>, position: Vec3, normal: Vec3) -> Option<Vec3> {
         let (place, distance2) = match near {
             Near::Few(few) => {
-                let places = few.iter().filter(|&&number| number as usize % KNOWN == 0);
+                let places = few.iter().filter(|&&number| (number as usize).is_multiple_of(KNOWN));
                 let (number, distance2) = places
                     .map(|&number| (number, self.distance2(number, position)))
                     .min_by(|a, b| a.1.total_cmp(&b.1))?;
